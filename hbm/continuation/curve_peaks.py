@@ -32,17 +32,12 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class CurvePeakRules:
-    """How peaks of a curve are refined.
+    """How peaks of a curve are refined."""
 
-    max_refined : maxima of a curve, the highest foreseen first
-    trials : solves along the arc, after which the maximum is left as it is
-    shortest : arc length between two points, of what they were apart at first, beside a kink where no slope vanishes
-    tangent : relative accuracy of tangents"""
-
-    max_refined: int = 3
-    trials: int = 40
-    shortest: float = 1e-6
-    tangent: float = 1e-8
+    max_refined: int = 3  # maxima of a curve, the highest foreseen first
+    trials: int = 40  # solves along the arc, after which the maximum is left as it is
+    shortest: float = 1e-6  # arc length between two points, of the first one, beside a kink where no slope vanishes
+    tangent: float = 1e-8  # relative accuracy of tangents
 
 
 RULES = CurvePeakRules()

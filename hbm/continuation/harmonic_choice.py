@@ -10,6 +10,7 @@ the split by harmonic is ours."""
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from weakref import WeakKeyDictionary
 
@@ -24,6 +25,8 @@ from tribodyn.hbm.newton import NewtonOptions
 from tribodyn.hbm.threads import single
 from tribodyn.refusal import SolverFailure
 
+LINEAR_ACCURACY = 1e-3  # of the linear solves behind an estimate, which is of first order itself
+LEAST_VIBRATION = 1e-2  # an output that vibrates less than this share of the largest is measured against that share
 ROUGH = 1e-5  # error of the compliance at the highest harmonic that estimates at single states may have
 _WIDE: WeakKeyDictionary[ContactCompliance, ContactCompliance] = WeakKeyDictionary()
 
@@ -44,19 +47,6 @@ class ChoiceOptions:
     allowed_share: float = 0.5
     useful_in_a_row: int = 3
     newton: NewtonOptions = field(default_factory=NewtonOptions)
-
-
-@dataclass(frozen=True)
-class EstimateRules:
-    """linear_accuracy : of the linear solves behind an estimate, which is of first order itself
-
-    least_vibration : an output that vibrates less than this share of the largest is measured against that share"""
-
-    linear_accuracy: float = 1e-3
-    least_vibration: float = 1e-2
-
-
-RULES = EstimateRules()
 
 
 @dataclass(frozen=True)
@@ -104,27 +94,37 @@ class NotSolved(SolverFailure):
 
 
 @single
-def choose(balance: HarmonicBalance, omega: Sequence[float], options: ChoiceOptions | None = None) -> HarmonicChoice:
+def choose(
+    balance: HarmonicBalance, omega: Sequence[float], options: ChoiceOptions | None = None,
+    solved_x: Mapping[float, np.ndarray] | None = None,
+) -> HarmonicChoice:  # fmt: skip
     """Choose harmonics for a problem, at frequencies where the choice matters, such as about a resonance.
 
-    balance : the problem; its own harmonics play no part beyond those that carry loads, its samples are kept
-    omega : frequencies [rad/s]
-    Returns the choice, also where the tolerance is not met with the harmonics allowed: `outcome` says so
+    balance : the problem; its samples are kept, its harmonics where it has `solved_x`, else those that carry loads
+    omega : frequencies [rad/s]; solved_x : frequency -> x of a solution of the balance [m]
+    Returns the choice; `outcome` says where it misses the tolerance and whether more harmonics have no solution nearby
     Raises  NotSolved; ValueError where the samples are too few for the highest harmonic of the estimate"""
     options = options or ChoiceOptions()
     wide = widened(balance, options.highest)
     loaded = {h for (h, _), value in balance.excitation.loads.items() if value != 0}
     if balance.basis.has_static:
         loaded.add(0)
-    harmonics = tuple(sorted(loaded | {1}))
-    trial = _Trial.of(wide, harmonics, omega, None, options)
-    history = [(harmonics, trial.error)]
+    solved_x = solved_x or {}
+    harmonics = tuple(sorted({*loaded, 1, *(balance.basis.harmonics if solved_x else ())}))
+    starts = [[balance.basis.transfer(solved_x[w], wide.basis)] if w in solved_x else [] for w in omega]
+    trial = _Trial.of(wide, harmonics, omega, starts, options)
+    history, cure = [(harmonics, trial.error)], f"allow harmonics above {options.highest}"
     for _ in range(options.rounds):
         additions = trial.additions(options)
         if trial.error <= options.tolerance or not additions:
             break
-        harmonics = tuple(sorted({*harmonics, *additions}))
-        trial = _Trial.of(wide, harmonics, omega, trial, options)
+        larger = tuple(sorted({*harmonics, *additions}))
+        try:
+            trial = _Trial.of(wide, larger, omega, trial.starts(wide), options, first=False)
+        except NotSolved as not_solved:
+            cure = str(not_solved).removeprefix("harmonics cannot be chosen: ")
+            break
+        harmonics = larger
         history.append((harmonics, trial.error))
     useful = 0
     least_first = [trial.harmonics[i] for i in np.argsort(trial.content)]
@@ -132,27 +132,21 @@ def choose(balance: HarmonicBalance, omega: Sequence[float], options: ChoiceOpti
         if trial.error > options.tolerance or useful == options.useful_in_a_row:
             break
         fewer = tuple(k for k in harmonics if k != h)
-        attempt = _Trial.of(wide, fewer, omega, trial, options, shrinking=True)
-        history.append((fewer, attempt.error))
         useful += 1
-        if attempt.error <= options.tolerance:
-            harmonics, trial, useful = fewer, attempt, 0
+        with suppress(NotSolved):
+            attempt = _Trial.of(wide, fewer, omega, trial.starts(wide), options, first=False, shrinking=True)
+            history.append((fewer, attempt.error))
+            if attempt.error <= options.tolerance:
+                harmonics, trial, useful = fewer, attempt, 0
     if not trial.worst.shares:
-        trial = _Trial.of(wide, harmonics, omega, trial, options)
-    is_accurate = trial.error <= options.tolerance
+        trial = _Trial.of(wide, harmonics, omega, trial.starts(wide), options)
     outcome = f"harmonics {', '.join(map(str, harmonics))}: estimated truncation error {trial.error:.1e}"
-    if not is_accurate:
-        outcome += f", above the tolerance {options.tolerance:.1e}: allow harmonics above {options.highest}"
+    if trial.error > options.tolerance:
+        outcome += f", above the tolerance {options.tolerance:.1e}: {cure}"
     return HarmonicChoice(
-        harmonics,
-        trial.worst,
-        options.tolerance,
-        tuple(omega),
-        tuple(history),
-        wide.with_harmonics(harmonics),
-        tuple(trial.x),
-        outcome,
-    )
+        harmonics, trial.worst, options.tolerance, tuple(omega), tuple(history), wide.with_harmonics(harmonics),
+        tuple(trial.x), outcome,
+    )  # fmt: skip
 
 
 def widened(balance: HarmonicBalance, highest: int, error: float | None = None) -> HarmonicBalance:
@@ -187,7 +181,7 @@ def estimate(
     linear, point = wide.linearise(state), wide.at(omega)
     direct = wide.outputs(state)
     vibration = np.linalg.norm(response[:, wide.basis.order > 0], axis=1)
-    scale = np.maximum(vibration, RULES.least_vibration * vibration.max(initial=0.0))
+    scale = np.maximum(vibration, LEAST_VIBRATION * vibration.max(initial=0.0))
     scale[scale == 0] = np.inf
 
     def measure(change: np.ndarray) -> float:
@@ -195,7 +189,7 @@ def estimate(
 
     def change(of: list[int]) -> tuple[np.ndarray, np.ndarray]:
         rows = np.isin(wide.basis.order, of)
-        dx, _, _ = linear.solve(np.where(rows, -state.residual, 0.0), RULES.linear_accuracy)
+        dx, _, _ = linear.solve(np.where(rows, -state.residual, 0.0), LINEAR_ACCURACY)
         return dx, point.outputs(linear.departure_slope(dx)) + np.where(rows, direct, 0.0)
 
     absent = [h for h in wide.basis.harmonics if h not in kept_harmonics]
@@ -216,26 +210,24 @@ class _Trial:
 
     @classmethod
     def of(
-        cls,
-        wide: HarmonicBalance,
-        kept_harmonics: tuple[int, ...],
-        omega: Sequence[float],
-        before: _Trial | None,
-        options: ChoiceOptions,
-        shrinking: bool = False,
-    ) -> _Trial:
-        """Solve and estimate, from the solutions of another set where there is one; raises NotSolved.
+        cls, wide: HarmonicBalance, kept_harmonics: tuple[int, ...], omega: Sequence[float],
+        starts: Sequence[Sequence[np.ndarray]], options: ChoiceOptions, first: bool = True, shrinking: bool = False,
+    ) -> _Trial:  # fmt: skip
+        """Solve and estimate, from x with all harmonics at each frequency or else from rest; raises NotSolved.
 
+        first : whether a solution that is found neither way is searched along the load, which takes long
         shrinking : only whether the tolerance is met matters, not the shares; ends at the first frequency where not"""
         narrow = wide.with_harmonics(kept_harmonics)
         solved, estimates = [], []
         content = np.zeros(len(kept_harmonics))
         for i, w in enumerate(omega):
-            if before is not None:
-                basis_before = replace(wide.basis, harmonics=before.harmonics)
-                solution = newton.solve(narrow, w, basis_before.transfer(before.x[i], narrow.basis), options.newton)
-            if before is None or not solution.converged:
-                solution = arc_length.solve_along_load(narrow, w, options.newton)
+            for start in starts[i]:
+                solution = newton.solve(narrow, w, wide.basis.transfer(start, narrow.basis), options.newton)
+                if solution.converged:
+                    break
+            if not starts[i] or not solution.converged:
+                search = arc_length.solve_along_load if first else newton.solve_from_rest
+                solution = search(narrow, w, options.newton)
             if not solution.converged:
                 where = f"{w / (2 * np.pi):.6g} Hz with harmonics {', '.join(map(str, kept_harmonics))}"
                 raise NotSolved(f"harmonics cannot be chosen: no solution at {where}: {solution.outcome}")
@@ -247,6 +239,11 @@ class _Trial:
             if shrinking and estimates[-1].error > options.tolerance:
                 break
         return cls(kept_harmonics, solved, content, estimates)
+
+    def starts(self, wide: HarmonicBalance) -> list[list[np.ndarray]]:
+        """x at each frequency with all harmonics, those left out at zero or as estimated [m]."""
+        basis = replace(wide.basis, harmonics=self.harmonics)
+        return [[basis.transfer(x, wide.basis), e.x] for x, e in zip(self.x, self.estimates, strict=True)]
 
     @property
     def worst(self) -> Estimate:

@@ -78,10 +78,8 @@ def highest(
     solves, doubt, row = len(heights), RULES.least_doubt, 0
     for point, output in candidates(branch.omega, heights):
         neighbours = slice(point - 1, point + 2)
-        omega, height = (
-            branch.omega[neighbours].tolist(),
-            vertex(branch.omega[neighbours], heights[neighbours, output])[1],
-        )
+        omega = branch.omega[neighbours].tolist()
+        height = vertex(branch.omega[neighbours], heights[neighbours, output])[1]
         if best is not None and (1 + doubt) * height < best.amplitude:
             continue
         solved_x = dict(zip(omega, map(balance.shaped, branch.contact[neighbours]), strict=True))

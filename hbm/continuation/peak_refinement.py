@@ -10,6 +10,7 @@ import numpy as np
 from tribodyn.hbm import newton
 from tribodyn.hbm.balance import HarmonicBalance
 from tribodyn.hbm.continuation.amplitude_slope import AmplitudeSlope
+from tribodyn.hbm.continuation.branch import Branch
 from tribodyn.hbm.continuation.operating_point import OperatingPoint
 from tribodyn.hbm.newton import Solution
 from tribodyn.hbm.outcome import SolveEnd
@@ -22,7 +23,20 @@ MAX_SOLVES = 60
 
 
 class NoPeak(Refusal):
-    """The response has no maximum inside the range that is searched; the message says where it still rises."""
+    """The response has no maximum inside its range; the message says where it rises, `branch` is what was scanned."""
+
+    def __init__(self, sentence: str, branch: Branch | None = None) -> None:
+        super().__init__(sentence)
+        self.branch = branch
+
+    def spread(self, balance: HarmonicBalance) -> dict[float, np.ndarray]:
+        """Frequency -> x at the ends and in the middle of the response of a balance [rad/s, m]; empty without one."""
+        branch = self.branch
+        if branch is None or branch.harmonics != balance.basis.harmonics or not branch.converged.any():
+            return {}
+        omega, x = branch.omega[branch.converged], branch.contact[branch.converged]
+        nearest = {int(np.argmin(np.abs(omega - place))): None for place in np.linspace(omega[0], omega[-1], 3)}
+        return {float(omega[i]): balance.shaped(x[i]) for i in nearest}
 
 
 class PeakRefinement:

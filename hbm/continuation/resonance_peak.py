@@ -131,11 +131,9 @@ class AtPeak:
         tracked = float(np.clip(point.state.omega, low, high))
         lower_balance = self._with_harmonics_to(balance, self.scan_harmonic)
         upper_balance = self._with_harmonics_to(balance, min(self.scan_harmonic_above, self.scan_harmonic))
-        ranges = (
-            [(low, tracked, lower_balance), (tracked, high, upper_balance)]
-            if lower_balance.basis != upper_balance.basis
-            else [(low, high, lower_balance)]
-        )
+        ranges = [(low, tracked, lower_balance), (tracked, high, upper_balance)]
+        if lower_balance.basis == upper_balance.basis:
+            ranges = [(low, high, lower_balance)]
         result = DominantPeak()
         for start, stop, reduced in ranges:
             if result.point is None and stop > start:
@@ -224,14 +222,9 @@ class AtPeak:
     def _scan(self, balance: HarmonicBalance, guess: np.ndarray | None = None) -> Branch:
         step = min(1 / self.n_scan, self.longest_scan_step)
         options = adaptive.Options(
-            tolerance=self.scan_tolerance,
-            step=step,
-            max_step=min(5 * step, self.longest_scan_step),
-            min_step=1e-3 * step,
-            newton=self.newton,
-            load_paths=not self._is_rough(balance),
-            guess=guess,
-        )
+            tolerance=self.scan_tolerance, step=step, max_step=min(5 * step, self.longest_scan_step),
+            min_step=1e-3 * step, newton=self.newton, load_paths=not self._is_rough(balance), guess=guess,
+        )  # fmt: skip
         return adaptive.follow(balance, self.start, self.stop, options)
 
     def _highest(self, balance: HarmonicBalance, branch: Branch, maxima: np.ndarray) -> OperatingPoint:
@@ -274,12 +267,13 @@ class AtPeak:
         low, high = branch.omega.min() / (2 * np.pi), branch.omega.max() / (2 * np.pi)
         span = f"{low:.5g} and {high:.5g} Hz"
         if height.max(initial=0.0) <= 0.0:
-            raise NoPeak(f"no resonance peak of {self.output}: it does not vibrate between {span}")
+            raise NoPeak(f"no resonance peak of {self.output}: it does not vibrate between {span}", branch)
         end = float(branch.omega[int(np.argmax(height))] / (2 * np.pi))
         raise NoPeak(
             f"no resonance peak of {self.output} lies between {span}: the response still rises towards the "
             f"{'lower' if end == low else 'upper'} end at {end:.5g} Hz; extend response.frequency beyond it, "
-            "or name a frequency in wear.at"
+            "or name a frequency in wear.at",
+            branch,
         )
 
 

@@ -79,29 +79,34 @@ def choose_harmonics(
     worn_at: Sequence[float] = (),
     n_choices: int = 3,
     same_peak: float = 1e-3,
+    small_change: float = 0.1,
 ) -> HarmonicChoice | None:
     """Harmonics that make the response of every output right to the tolerance of the options where it matters.
 
-    The harmonics chosen move the resonance: it is searched again with them, and they are chosen anew there. Without a
-    peak they are chosen at the ends of its range and in the middle.
+    The harmonics chosen move the resonance: it is followed with them, or where they change much searched again, and
+    they are chosen anew there. Without a peak they are chosen at the ends of its range and in the middle.
     peak : where the resonance is searched, with the harmonics of the balance at first; worn_at : other frequencies
         [rad/s]; n_choices : times that harmonics are chosen; same_peak : relative distance that counts as none
+    small_change : of the response by the harmonics chosen, up to which another peak is not taken to be the highest
     Returns the last choice, None where no solution was found to choose by: the response says where and why"""
-    choice, previous = None, 0.0
+    choice, solved_x, places = None, dict[float, np.ndarray](), dict[float, np.ndarray]()
     for _ in range(n_choices):
+        tracked = choice is not None and len(places) == 1 and choice.history[0][1] <= small_change
         try:
-            point = peak.solve(balance)
-            resonance = [point.state.omega] if point.solution.converged else []
-        except (NoPeak, SolverFailure):
-            resonance = []
-        frequencies = [*(resonance or np.linspace(peak.start, peak.stop, 3).tolist()), *worn_at]
-        if choice is not None and abs(frequencies[0] - previous) <= same_peak * frequencies[0]:
+            point = peak.solve_near(balance, *next(iter(solved_x.items()))) if tracked else peak.solve(balance)
+            places = {point.state.omega: point.state.x} if point.solution.converged else {}
+        except (NoPeak, SolverFailure) as failure:
+            places = failure.spread(balance) if isinstance(failure, NoPeak) else {}
+        frequencies = [*(places or np.linspace(peak.start, peak.stop, 3).tolist()), *worn_at]
+        if choice is not None and abs(frequencies[0] - choice.omega[0]) <= same_peak * frequencies[0]:
             break
         try:
-            choice = harmonic_choice.choose(balance, frequencies, options)
+            choice = harmonic_choice.choose(balance, frequencies, options, solved_x | places)
         except harmonic_choice.NotSolved:
             break
-        balance, previous = choice.balance, frequencies[0]
+        if choice.harmonics == balance.basis.harmonics:
+            break
+        balance, solved_x = choice.balance, dict(zip(choice.omega, choice.x, strict=True))
     return choice
 
 
@@ -153,10 +158,5 @@ def worn_responses(
     def padded(values: np.ndarray) -> np.ndarray:
         return np.concatenate([values, np.full(size - len(values), np.nan)])
 
-    return WornResponses(
-        rows,
-        np.stack([padded(curve.omega) for curve in branches]),
-        np.stack(
-            [padded(np.where(curve.converged, curve.amplitude(curve.output_names[0]), np.nan)) for curve in branches]
-        ),
-    )
+    heights = [np.where(curve.converged, curve.amplitude(curve.output_names[0]), np.nan) for curve in branches]
+    return WornResponses(rows, np.stack([padded(curve.omega) for curve in branches]), np.stack([*map(padded, heights)]))
