@@ -127,7 +127,7 @@ def choose(
         harmonics = larger
         history.append((harmonics, trial.error))
     useful = 0
-    least_first = [trial.harmonics[i] for i in np.argsort(trial.content)]
+    least_first = [trial.harmonics[i] for i in np.argsort(trial.content) if len(history) > 1]
     for h in [h for h in least_first if h not in loaded and h != 1]:
         if trial.error > options.tolerance or useful == options.useful_in_a_row:
             break
@@ -143,10 +143,11 @@ def choose(
     outcome = f"harmonics {', '.join(map(str, harmonics))}: estimated truncation error {trial.error:.1e}"
     if trial.error > options.tolerance:
         outcome += f", above the tolerance {options.tolerance:.1e}: {cure}"
+    chosen = wide.with_harmonics(harmonics)
+    _WIDE[chosen.compliance] = wide.compliance  # where they are chosen again
     return HarmonicChoice(
-        harmonics, trial.worst, options.tolerance, tuple(omega), tuple(history), wide.with_harmonics(harmonics),
-        tuple(trial.x), outcome,
-    )  # fmt: skip
+        harmonics, trial.worst, options.tolerance, tuple(omega), tuple(history), chosen, tuple(trial.x), outcome
+    )
 
 
 def widened(balance: HarmonicBalance, highest: int, error: float | None = None) -> HarmonicBalance:

@@ -48,6 +48,10 @@ def test_estimate_is_the_true_change_and_the_choice_meets_the_tolerance():
             assert 0 in choice.harmonics
             assert choice.history[0][0] == (0, 1)
             assert set(choice.estimate.shares).isdisjoint(choice.harmonics)
+            solved_x = dict(zip(omega, choice.x, strict=True))
+            repeated = choose(choice.balance, omega, ChoiceOptions(tolerance=tolerance, highest=13), solved_x)
+            assert [harmonics for harmonics, _ in repeated.history] == [choice.harmonics]
+            np.testing.assert_allclose(repeated.estimate.error, choice.estimate.error, rtol=1e-3)
 
 
 def test_the_set_is_the_smallest_that_brute_force_finds():
@@ -107,6 +111,10 @@ def test_it_says_what_it_could_not_do():
     short = choose(balance, omega, ChoiceOptions(tolerance=1e-6, highest=3))
     assert "above the tolerance" in short.outcome
     assert short.outcome.endswith("allow harmonics above 3")
+    options = ChoiceOptions(tolerance=1e-6, newton=newton.NewtonOptions(max_steps=0))
+    unsolved = choose(short.balance, omega, options, dict(zip(omega, short.x, strict=True)))
+    assert unsolved.harmonics == short.harmonics
+    assert "above the tolerance 1.0e-06: no solution at 0.2" in unsolved.outcome
     with pytest.raises(NotSolved, match="harmonics cannot be chosen: no solution at"):
         choose(balance, omega, ChoiceOptions(newton=newton.NewtonOptions(max_steps=0)))
     with pytest.raises(ValueError, match="time samples cannot carry"):
