@@ -54,6 +54,8 @@ frequency = ["4.5 kHz", "7 kHz"]
 points = 10
 [reduction]
 modes = 6
+[harmonics]
+kept = [0, 1]
 [damping]
 modal = "1 %"
 """
@@ -109,6 +111,8 @@ direction = "x"
 frequency = ["1 kHz", "2 kHz"]
 [reduction]
 modes = 5
+[harmonics]
+kept = [0, 1]
 """
 
 
