@@ -1,4 +1,4 @@
-"""Asperities of a measured face: its summits, their curvature, density and heights; and what a random face would have.
+"""Asperities of a measured face: its summits, their curvature, density and heights.
 
 Two rough faces count as one: the sum of their heights against a plane, whose summits have the effective radius
 (Greenwood and Tripp 1970)."""
@@ -15,55 +15,16 @@ from tribodyn.refusal import Refusal
 
 
 @dataclass(frozen=True)
-class Moments:
-    """Spectral moments of a face, mean over x and y of their profiles.
-
-    m0 : variance of the heights [m2];  m2 : of the slopes [-];  m4 : of the curvatures [1/m2]
-    Source  McCool, Wear 107 (1986) 37; its summits where it is isotropic and Gaussian: Nayak, J. Lubr. Technol. 93
-        (1971) 398"""
-
-    m0: float
-    m2: float
-    m4: float
-
-    @property
-    def alpha(self) -> float:
-        """Nayak's bandwidth m0 m4 / m2^2, 1.5 or more."""
-        return self.m0 * self.m4 / self.m2**2
-
-    @property
-    def density(self) -> float:
-        """Summits per area of a Gaussian face [1/m2]: Nayak's m4 / (6 pi sqrt(3) m2)."""
-        return self.m4 / (6 * np.pi * np.sqrt(3) * self.m2)
-
-    @property
-    def radius(self) -> float:
-        """One over the mean curvature of its summits [m]: 3/8 sqrt(pi / m4)."""
-        return 3 / 8 * float(np.sqrt(np.pi / self.m4))
-
-    @property
-    def deviation(self) -> float:
-        """Standard deviation of the heights of its summits [m]: sqrt((1 - 0.8968 / alpha) m0)."""
-        return float(np.sqrt((1 - 0.8968 / self.alpha) * self.m0))
-
-    @property
-    def mean(self) -> float:
-        """Mean height of its summits above the mean of the face [m]: 4 sqrt(m0 / (pi alpha))."""
-        return 4 * float(np.sqrt(self.m0 / (np.pi * self.alpha)))
-
-
-@dataclass(frozen=True)
 class Asperities:
     """Summits of a face.
 
     height : (n,) above the mean of the face [m];  curvature : (n,) mean of that along x and y, positive [1/m]
-    area : searched for summits [m2];  moments : of the same face
+    area : searched for summits [m2]
     repairs : one sentence for each thing that was changed in a map"""
 
     height: np.ndarray
     curvature: np.ndarray
     area: float
-    moments: Moments
     repairs: tuple[str, ...] = ()
 
     @property
@@ -125,7 +86,7 @@ def identify(
     both_faces = faces[0] if len(faces) == 1 else _sum(*faces)
     height, curvature = summits(both_faces)
     area = float(np.prod([step * (n - 2) for step, n in zip(both_faces.spacing, both_faces.z.shape, strict=True)]))
-    return Asperities(height, curvature, area, moments(both_faces), tuple(repairs))
+    return Asperities(height, curvature, area, tuple(repairs))
 
 
 def _sum(first: HeightMap, second: HeightMap) -> HeightMap:
@@ -183,14 +144,6 @@ def _refuse_steps(surface: HeightMap) -> None:
             f"{surface.name}: {shared} points are as high as their highest neighbour and {single} above all of them, "
             "so that its heights come in steps and summits cannot be found: give `shortest`, some steps of the grid"
         )
-
-
-def moments(surface: HeightMap) -> Moments:
-    """Spectral moments of a face by differences of its grid."""
-    steps = surface.spacing
-    slope = [np.mean((np.diff(surface.z, axis=axis) / step) ** 2) for axis, step in enumerate(steps)]
-    bend = [np.mean(second**2) for second in _bends(surface)]
-    return Moments(float(surface.z.var()), float(np.mean(slope)), float(np.mean(bend)))
 
 
 def _bends(surface: HeightMap) -> tuple[np.ndarray, np.ndarray]:

@@ -14,7 +14,6 @@ class DerivativeRules:
     """How exactly is solved, and what counts as a corner. Half widths are those of the resonance."""
 
     state_tolerance: float = 1e-12  # relative residual of the states at which derivatives are taken
-    mode_tolerance: float = 1e-10
     adjoint_tolerance: float = 1e-12  # relative residual of an adjoint, and the largest of one that counts
     adjoint_limit: float = 1e-7
     adjoint_products: int = 400

@@ -8,8 +8,8 @@ import pytest
 
 import tribodyn as td
 from tests.helpers.command import printed_record, printed_text, refusal
-from tests.helpers.rough_faces import caps, gaussian
-from tribodyn.geometry.asperities import Moments, identify, moments, summits
+from tests.helpers.rough_faces import Moments, caps, gaussian
+from tribodyn.geometry.asperities import identify, summits
 from tribodyn.geometry.height_map import HeightMap
 
 RADIUS, SPACING_OF_SUMMITS, STEP = 200e-6, 41e-6, 1e-6
@@ -60,8 +60,6 @@ def test_a_random_face_has_the_summits_that_nayak_counts(shortest):
     assert fit.radius == pytest.approx(reference.radius, rel=0.05)
     assert fit.height.std() == pytest.approx(reference.deviation, rel=0.05)
     assert fit.height.mean() == pytest.approx(reference.mean, rel=0.05)
-    base = moments(face)
-    np.testing.assert_allclose([base.m0, base.m2, base.m4], [reference.m0, reference.m2, reference.m4], rtol=0.04)
 
 
 def test_cut_off_and_noise_filter_leave_the_roughness_between_them():

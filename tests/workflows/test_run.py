@@ -59,7 +59,7 @@ def wait_for_rows(process: subprocess.Popen[str], path: Path, count: int) -> Non
 
 def test_the_run_ends_with_contact_lost(finished: Result) -> None:
     assert finished.state == "complete: contact lost at every pair"
-    assert finished.contact_lost
+    assert finished.wear.ended.lost
     assert finished.wear.preload[0] > 1e3
     assert finished.wear.preload[-1] == 0.0
     assert finished.wear.depth[-1].max() > finished.facts.delta_max
@@ -231,7 +231,7 @@ def test_resuming_another_scene_is_refused(finished, tmp_path, capsys):
 def test_an_earlier_result_is_set_aside(finished: Result, tmp_path: Path) -> None:
     store.save(tmp_path / "result.h5", finished)
     pipeline.run(read("beam", [*SMALL, "wear.max_steps=0"]), tmp_path, Progress())
-    assert store.load(tmp_path / "result.previous.h5").contact_lost
+    assert store.load(tmp_path / "result.previous.h5").wear.ended.lost
     assert store.load(tmp_path / "result.h5").wear_steps == 0
 
 

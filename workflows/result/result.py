@@ -272,11 +272,6 @@ class Result:
         """Number of wear steps taken."""
         return 0 if self.wear is None else int(np.count_nonzero(self.wear.cycles_in_step))
 
-    @property
-    def contact_lost(self) -> bool:
-        """Whether wear went on until every pair was separated."""
-        return self.wear is not None and self.wear.ended.lost
-
     def summary(self) -> dict[str, Any]:
         """The numbers of the result as plain data, see result.summary: what `tribodyn show --json` prints."""
         return summary(self)

@@ -30,7 +30,7 @@ class FaceAsperities(StudyResult):
 
     def record(self) -> dict[str, Any]:
         """For machines."""
-        asperities, m = self.asperities, self.asperities.moments
+        asperities = self.asperities
         return {
             "summits": len(asperities.height),
             "radius_m": asperities.radius,
@@ -38,28 +38,19 @@ class FaceAsperities(StudyResult):
             "deviation_m": float(asperities.height.std()),
             "mean_height_m": float(asperities.height.mean()),
             "largest_gap_m": float(asperities.gap.max()),
-            "moments": {"m0_m2": m.m0, "m2": m.m2, "m4_per_m2": m.m4, "alpha": m.alpha},
-            "gaussian": {
-                "radius_m": m.radius,
-                "density_per_m2": m.density,
-                "deviation_m": m.deviation,
-                "mean_height_m": m.mean,
-            },
             "repairs": list(asperities.repairs),
         }
 
     def lines(self) -> list[str]:
         """For people; the last one is for the table of a contact."""
-        asperities, m = self.asperities, self.asperities.moments
+        asperities = self.asperities
         return named_lines(
             [
                 ("summits", f"{len(asperities.height)} on {asperities.area:.3g} m2"),
-                ("", f"{'found':>12} {'if Gaussian':>12}"),
-                ("radius", f"{asperities.radius:12.4g} {m.radius:12.4g} m"),
-                ("density", f"{asperities.density:12.4g} {m.density:12.4g} 1/m2"),
-                ("deviation", f"{asperities.height.std():12.4g} {m.deviation:12.4g} m, of their heights"),
-                ("mean height", f"{asperities.height.mean():12.4g} {m.mean:12.4g} m, above the mean plane"),
-                ("moments", f"m0 {m.m0:.4g} m2, m2 {m.m2:.4g}, m4 {m.m4:.4g} 1/m2, alpha {m.alpha:.3g}"),
+                ("radius", f"{asperities.radius:.4g} m"),
+                ("density", f"{asperities.density:.4g} 1/m2"),
+                ("deviation", f"{asperities.height.std():.4g} m, of their heights"),
+                ("mean height", f"{asperities.height.mean():.4g} m, above the mean plane"),
                 *(("repaired", sentence) for sentence in asperities.repairs),
                 ("for a contact", f'law = "rough", table = "asperities.csv", radius = "{asperities.radius:.6g} m"'),
             ]
