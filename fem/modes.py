@@ -4,7 +4,7 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from scipy.linalg import LinAlgError, eigh, eigvalsh
+from scipy.linalg import LinAlgError, cholesky, eigh, eigvalsh, solve_triangular
 from scipy.sparse import block_array
 from scipy.sparse.linalg import ArpackNoConvergence, LinearOperator, eigsh
 from threadpoolctl import threadpool_limits
@@ -30,6 +30,7 @@ class EigenOptions:
 
 
 EIGEN = EigenOptions()
+ROUNDING = 1e-14  # of the largest mass, below which there is none
 UNSTABLE = "the structure is unstable at rest"
 CURE = "its speed or its static load is beyond divergence or buckling; lower it"
 
@@ -39,7 +40,7 @@ class StaticDivergence(Refusal):
 
 
 class IndefiniteMass(Refusal, LinAlgError):
-    """A direction without mass, or with a negative one, so that there are no modes."""
+    """A direction with a negative mass, or with neither mass nor stiffness, so that there are no modes."""
 
 
 def modes(
@@ -47,7 +48,8 @@ def modes(
 ) -> tuple[np.ndarray, np.ndarray]:
     """The n lowest modes, mass-normalised.
 
-    K, M : (N, N) sparse or dense, symmetric or Hermitian [N/m], [kg], M positive definite, K positive semidefinite
+    K, M : (N, N) sparse or dense, symmetric or Hermitian [N/m], [kg], K positive semidefinite, M positive definite, or
+        dense and semidefinite: then there are as many modes as there are directions with mass
     sigma : shift [rad^2/s^2] below the wanted modes; by default 0, or a little below where K is singular
     factor : factorisation of K - sigma M that exists already
     Returns omega (n,) ascending [rad/s], 0 for rigid-body modes to rounding; phi (N, n) [1/sqrt(kg)], each with its
@@ -58,12 +60,7 @@ def modes(
     if not 1 <= n <= size:
         raise Refusal(f"modes: {n} modes were asked of a system with {size} DOFs; ask for 1 to {size}")
     if isinstance(K, np.ndarray) or size <= EIGEN.dense_below or 2 * n >= size:
-        try:
-            values, phi = eigh(dense(K), dense(M), subset_by_index=[0, n - 1])
-        except LinAlgError as error:
-            raise IndefiniteMass(
-                "the mass matrix is not positive definite: mend it, or remove massless DOFs"
-            ) from error
+        values, phi, _ = dense_modes(dense(K), dense(M), n)
     else:
         if factor is None:
             factor, sigma = _factorise_shifted(K, M, sigma)
@@ -88,6 +85,37 @@ def modes(
     large = np.abs(phi) >= (1 - 1e-6) * np.abs(phi).max(axis=0)  # whatever the rounding
     sign = np.sign(phi[large.argmax(axis=0), np.arange(phi.shape[1])].conj())  # the first of these gets positive
     return frequencies(values, K, M), phi * sign
+
+
+def dense_modes(K: np.ndarray, M: np.ndarray, n: int | None = None) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """The n lowest modes of dense matrices, all by default, and what follows them without mass.
+
+    Returns squared frequencies (m,) and shapes (N, m) of unit modal mass; static (N, N - M's rank), of unit stiffness:
+    directions without mass follow the others at once
+    Raises  IndefiniteMass for a negative mass, and for a direction with neither mass nor stiffness"""
+    try:
+        return *eigh(K, M, subset_by_index=None if n is None else [0, n - 1]), np.zeros((len(M), 0))
+    except LinAlgError:
+        mass, direction = eigh(M)
+    if mass[0] < -ROUNDING * mass[-1]:
+        raise IndefiniteMass("the mass matrix has negative eigenvalues: mend it")
+    rest, heavy = np.split(direction, [int(np.sum(mass <= ROUNDING * mass[-1]))], axis=1)
+    try:
+        lower = cholesky(rest.conj().T @ K @ rest, lower=True)
+    except LinAlgError:
+        raise IndefiniteMass("a coordinate has neither mass nor stiffness: give it one of them") from None
+    static = solve_triangular(lower, rest.conj().T, lower=True).conj().T
+    heavy = heavy - static @ (static.conj().T @ K @ heavy)
+    squares, phi = eigh(heavy.conj().T @ K @ heavy, heavy.conj().T @ M @ heavy)
+    return squares[:n], heavy @ phi[:, :n], static
+
+
+def lowest_squares(K: np.ndarray, M: np.ndarray, n: int) -> np.ndarray:
+    """The n lowest squared frequencies of dense matrices; fewer where there are fewer directions with mass."""
+    try:
+        return np.asarray(eigh(K, M, eigvals_only=True, subset_by_index=(0, n - 1)))
+    except LinAlgError:
+        return dense_modes(K, M, n)[0]
 
 
 def turning_frequencies(K: Any, M: Any, G: Any, n: int) -> np.ndarray:

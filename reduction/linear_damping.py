@@ -6,6 +6,7 @@ import numpy as np
 from scipy.linalg import eigh
 from scipy.linalg.blas import dsyrk, zherk
 
+from tribodyn.fem.modes import dense_modes, lowest_squares
 from tribodyn.fem.system import SecondOrderSystem
 from tribodyn.refusal import Refusal
 
@@ -18,7 +19,7 @@ def modal_damping(system: SecondOrderSystem, ratio: float) -> np.ndarray:
     Raises  Refusal for a ratio below 0"""
     if not ratio >= 0:
         raise Refusal(f"damping: ratio = {ratio}: give a part of critical damping of 0 or more, such as 0.01")
-    values, phi = eigh(system.stiffness, system.mass)
+    values, phi, _ = dense_modes(system.stiffness, system.mass)
     # below this an eigenvalue is rounding of a rigid-body mode
     values[values < len(values) * np.finfo(float).eps * values[-1]] = 0.0
     weighted = (system.mass @ phi) * np.sqrt(2 * ratio * np.sqrt(values))
@@ -53,9 +54,10 @@ def rayleigh_of_ratios(
     """alpha [1/s] and beta [s] that give two modes of a system their damping ratios, zeta = alpha / 2 w + beta w / 2.
 
     Raises  Refusal where there are no such modes, one does not vibrate, or a coefficient would be negative"""
-    if max(modes) >= len(system.mass):
-        raise Refusal(f"damping.modes: there is no mode {max(modes)}, the system has {len(system.mass)}")
-    squares = eigh(system.stiffness, system.mass, eigvals_only=True, subset_by_index=(0, max(modes)))[list(modes)]
+    squares = lowest_squares(system.stiffness, system.mass, min(max(modes) + 1, len(system.mass)))
+    if max(modes) >= len(squares):
+        raise Refusal(f"damping.modes: there is no mode {max(modes)}, the system has {len(squares)}")
+    squares = squares[list(modes)]
     if not (squares > 0).all():
         raise Refusal(f"damping.modes: mode {min(modes)} is a motion as a rigid body: choose modes that vibrate")
     omega = np.sqrt(squares)

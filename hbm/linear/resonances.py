@@ -1,8 +1,8 @@
 """Where the linear responses of a balance resonate, its contact absent or closed and stuck."""
 
 import numpy as np
-import scipy.linalg as sla
 
+from tribodyn.fem.modes import lowest_squares
 from tribodyn.hbm.balance import HarmonicBalance
 from tribodyn.hbm.linear.expansion import RULES
 from tribodyn.reduction.linear import stuck_stiffness
@@ -19,7 +19,7 @@ def linear_resonances(balance: HarmonicBalance, springs: np.ndarray | None, coun
     for h in sorted(orders - {0}):
         system, B = balance.model.at_harmonic(h)
         stiffness = system.stiffness if springs is None else stuck_stiffness(system.stiffness, B, springs)
-        lam = sla.eigvalsh(stiffness, system.mass, subset_by_index=(0, min(count, system.n_dof) - 1))
+        lam = lowest_squares(stiffness, system.mass, min(count, system.n_dof))
         resonances.append(np.sqrt(np.maximum(lam, 0.0)) / h)
     return np.concatenate(resonances)
 

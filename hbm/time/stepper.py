@@ -11,6 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 import scipy.linalg as sla
 
+from tribodyn.fem.modes import dense_modes
 from tribodyn.fem.system import SecondOrderSystem
 from tribodyn.hbm.balance import HarmonicBalance, State
 from tribodyn.hbm.contact import compiled_law
@@ -22,7 +23,6 @@ from tribodyn.hbm.time.time_step import Moving, Record
 from tribodyn.refusal import Refusal, SolverFailure
 
 RESOLVED = 1.0  # omega h of a mode from which on its inertia is left out
-ROUNDING = 1e-14  # of the largest mass, below which there is none
 MASSLESS = 1e150  # eigenvalue of modes without mass, whose compliance alone counts
 
 
@@ -271,26 +271,8 @@ def _free_modes(system: SecondOrderSystem) -> tuple[np.ndarray, np.ndarray]:
         if (m > 0).all():
             order = np.argsort(k / m, kind="stable")
             return (k / m)[order], np.diag(1 / np.sqrt(m))[:, order]
-    try:
-        return sla.eigh(K, M)
-    except np.linalg.LinAlgError:
-        return _modes_beside_massless(K, M)
-
-
-def _modes_beside_massless(K: np.ndarray, M: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """As `_free_modes`, of a singular mass matrix: coordinates without mass follow the others statically."""
-    mass, direction = sla.eigh(M)
-    if mass[0] < -ROUNDING * mass[-1]:
-        raise Refusal("time integration needs a mass matrix without negative eigenvalues: check the matrices")
-    rest, heavy = np.split(direction, [int(np.sum(mass <= ROUNDING * mass[-1]))], axis=1)
-    try:
-        lower = sla.cholesky(rest.T @ K @ rest, lower=True)
-    except np.linalg.LinAlgError:
-        raise Refusal("a coordinate has neither mass nor stiffness: give it one of them") from None
-    static = sla.solve_triangular(lower, rest.T, lower=True).T  # (n, n_massless), K-orthonormal
-    heavy = heavy - static @ (static.T @ K @ heavy)
-    lam, phi = sla.eigh(heavy.T @ K @ heavy, heavy.T @ M @ heavy)
-    return np.append(lam, np.full(len(lower), MASSLESS)), np.hstack([heavy @ phi, np.sqrt(MASSLESS) * static])
+    lam, phi, static = dense_modes(K, M)
+    return np.append(lam, np.full(static.shape[1], MASSLESS)), np.hstack([phi, np.sqrt(MASSLESS) * static])
 
 
 def _exact_step(

@@ -31,7 +31,7 @@ def lines(matrices: ForeignMatrices) -> list[str]:
     """Sentences on matrices: what was changed on reading, their rigid-body modes, mass and first modes, doubts."""
     try:
         return [*matrices.notes, *matrices.facts().lines()]
-    except Refusal as problem:  # such as massless DOFs, which a balance can do with
+    except Refusal as problem:
         return [*matrices.notes, f"matrices: their modes are not known, {problem}"]
 
 

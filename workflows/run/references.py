@@ -6,6 +6,7 @@ import numpy as np
 import scipy.linalg as sla
 
 from tribodyn.fem.factor import SINGULAR, softest_residual
+from tribodyn.fem.modes import dense_modes
 from tribodyn.hbm.balance import HarmonicBalance
 from tribodyn.hbm.harmonics import amplitude
 from tribodyn.hbm.linear.resonances import linear_resonances
@@ -96,7 +97,7 @@ def _amplitudes(balance: HarmonicBalance, springs: np.ndarray | None, output: st
         if not force.any():
             continue
         stiffness = system.stiffness if springs is None else stuck_stiffness(system.stiffness, B, springs)
-        lam, phi = sla.eigh(stiffness, system.mass, subset_by_index=(0, min(LINEAR.modes, system.n_dof) - 1))
+        lam, phi, _ = dense_modes(stiffness, system.mass, min(LINEAR.modes, system.n_dof))
         shift = float((h * omega.mean()) ** 2)
         # a free body that turns is even driven outwards: its lam is below zero
         shift = 0.0 if lam[0] > LINEAR.rigid * shift else max(shift, -2 * lam[0])

@@ -7,14 +7,14 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from scipy.linalg import LinAlgError, cho_factor, cho_solve, eigh
+from scipy.linalg import LinAlgError, cho_factor, cho_solve
 from scipy.sparse import issparse
 
 from tribodyn.fem.assembly import Body, materials_of
 from tribodyn.fem.elasticity import densities
 from tribodyn.fem.factor import SingularStiffness, factorise
 from tribodyn.fem.material import AnyMaterial
-from tribodyn.fem.modes import modes
+from tribodyn.fem.modes import lowest_squares, modes
 from tribodyn.fem.part import Part
 from tribodyn.fem.system import SecondOrderSystem
 from tribodyn.geometry.mesh import facts
@@ -247,7 +247,7 @@ def _free(system: SecondOrderSystem) -> bool:
     """Whether a reduced structure moves as a rigid body but for rounding."""
     if not isinstance(system.stiffness, np.ndarray):
         return False
-    squares = eigh(system.stiffness, system.mass, eigvals_only=True, subset_by_index=(0, min(12, len(system.mass) - 1)))
+    squares = lowest_squares(system.stiffness, system.mass, min(13, len(system.mass)))
     return bool(abs(squares[0]) < TYPICAL.rigid * squares[-1])
 
 
