@@ -48,8 +48,7 @@ def modes(
 ) -> tuple[np.ndarray, np.ndarray]:
     """The n lowest modes, mass-normalised.
 
-    K, M : (N, N) sparse or dense, symmetric or Hermitian [N/m], [kg], K positive semidefinite, M positive definite, or
-        dense and semidefinite: then there are as many modes as there are directions with mass
+    K, M : (N, N) sparse or dense, symmetric or Hermitian [N/m], [kg], K positive semidefinite, M too where it is dense
     sigma : shift [rad^2/s^2] below the wanted modes; by default 0, or a little below where K is singular
     factor : factorisation of K - sigma M that exists already
     Returns omega (n,) ascending [rad/s], 0 for rigid-body modes to rounding; phi (N, n) [1/sqrt(kg)], each with its

@@ -18,7 +18,7 @@ from tribodyn.hbm.wear import wear_rule
 from tribodyn.hbm.wear.history import WearHistory
 from tribodyn.hbm.wear.steady_motion import untaken_periodic_share
 from tribodyn.refusal import Refusal, SolverFailure
-from tribodyn.workflows.errors import operating_states, refine
+from tribodyn.workflows.errors import contact_springs, ladders, operating_states, refine
 from tribodyn.workflows.errors.operating_states import OperatingState, Values, relative_change
 from tribodyn.workflows.errors.refinement_limits import DEFAULT, RefinementLimits
 from tribodyn.workflows.result.answers import worn_contact
@@ -181,6 +181,27 @@ class ChangeTable:
             text = "periodic motions that the irregular one did not take"
             self.estimate(Refinement.OTHER_MOTION, durations, difference, text)
 
+    def refine_springs(self, first: OperatingState) -> None:
+        """What springs do that stand for a closed contact: stiffer and stiffer ones, to their limit."""
+        closed = [name for name, contact in self.file.scene.joints.items() if contact.springs == "closed"]
+        if not closed:
+            return
+        self.say("stiffer springs of the contact")
+        if self.result.wear_steps:
+            self.estimate(Refinement.SPRINGS, self.names_of_wear, None, "wear with stiffer springs is not measured")
+        with self.refusals(Refinement.SPRINGS):
+            factors, states = zip(*contact_springs.stiffened(first, closed, self.limits), strict=True)
+            text = f"springs up to {factors[-1]:g} times as stiff"
+            for name, value in first.values.items():
+                values = [state.values[name] for state in states]
+                limit = ladders.springs_limit(factors, values, self.limits.floor)
+                if limit is None:
+                    self.estimate(Refinement.SPRINGS, [name], None, f"{text}, without a limit yet")
+                else:
+                    doubt = max(limit.doubt, relative_change(values[-1], limit.value))
+                    change = relative_change(value, limit.value) + doubt
+                    self.rows.append(MeasuredChange(Refinement.SPRINGS, name, value, limit.value, change, text))
+
     def refine_wear(self, finer: SceneFile | None, reason: str, first: OperatingState, wear: WearHistory) -> None:
         """Quantities of the whole wear on another mesh, with more modes, harmonics and wear steps.
 
@@ -240,6 +261,7 @@ def measure_changes(
     elif not isinstance(file.scene, MatrixScene):
         table.estimate(Refinement.MESH, names_with_error(CycleQuantity), None, reason)
     table.add_estimates(first)
+    table.refine_springs(first)
     worn = worn_contact(result)
     if worn is not None and worn.history.in_time[:1].any():
         values = operating_states.values_before(worn)

@@ -155,14 +155,16 @@ def total_error(
     def size(*refinements: Refinement) -> float:
         return sum(row.relative or 0.0 for row in rows if row.refinement in refinements)
 
-    needed = (Refinement.COMBINED, Refinement.MESH, Refinement.HARMONICS, Refinement.OTHER_MOTION)
+    needed = (
+        Refinement.COMBINED, Refinement.MESH, Refinement.HARMONICS, Refinement.SPRINGS, Refinement.OTHER_MOTION,
+    )  # fmt: skip
     unknown = [row.description for row in rows if row.relative is None and row.refinement in needed]
     if unknown or not any(row.refinement in (*needed, Refinement.MOTION) for row in rows):
         return None, (*unknown, "no refinement was measured")[0]
     least = max(size(Refinement.MOTION), size(Refinement.WEAR_STEPS))
     chance = least if size(Refinement.MOTION) else 0.0  # then means and steps scatter
     change = max(size(Refinement.COMBINED, Refinement.MESH, Refinement.MODES), chance)
-    truncation = limits.safety * size(Refinement.HARMONICS, Refinement.SAMPLES)
+    truncation = limits.safety * size(Refinement.HARMONICS, Refinement.SAMPLES, Refinement.SPRINGS)
     return max(limits.total(change, ratio), least) + truncation + size(Refinement.OTHER_MOTION), ""
 
 

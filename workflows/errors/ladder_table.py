@@ -8,7 +8,7 @@ from threadpoolctl import threadpool_limits
 
 from tribodyn.hbm.quantity import names_with_error
 from tribodyn.refusal import Refusal
-from tribodyn.workflows.errors import operating_states
+from tribodyn.workflows.errors import contact_springs, operating_states
 from tribodyn.workflows.errors.change_table import NOT_SOLVED
 from tribodyn.workflows.errors.ladders import Ladder, Limit, Setting, ladders_of, limit_of, study_of
 from tribodyn.workflows.run import memory, modelling, response_curve
@@ -24,7 +24,8 @@ class SolvedSetting:
     """Values by quantity, None where the scene does not ask or the solve failed, as `outcome` says.
 
     pairs : of contact nodes
-    seconds : of one processor, of which `wear_seconds` went into wear; memory : its peak [bytes]"""
+    seconds : of one processor, of which `wear_seconds` went into wear; memory : its peak [bytes]
+    shares : of open, stick and slip in the cycle, over pairs and instants"""
 
     values: dict[str, float | None]
     pairs: int
@@ -32,6 +33,7 @@ class SolvedSetting:
     wear_seconds: float
     memory: float
     outcome: str
+    shares: tuple[float, ...] | None = None
 
 
 @dataclass(frozen=True)
@@ -86,7 +88,7 @@ class LadderTables:
 def solve_setting(file: SceneFile, wears: bool = True) -> SolvedSetting:
     """Solve a scene before wear, and wear it where that is wanted; raises Refusal for what it cannot be."""
     values: dict[str, float | None] = dict.fromkeys(names_with_error())
-    outcome, clock = SOLVED, process_time()
+    outcome, shares, clock = SOLVED, None, process_time()
     memory.forget_peak()
     with threadpool_limits(1):
         model = modelling.build(file, Progress())
@@ -98,6 +100,7 @@ def solve_setting(file: SceneFile, wears: bool = True) -> SolvedSetting:
                 branch = response_curve.follow_response(file.scene, model.balance)
                 state = operating_states.state_at_peak(file.scene, model.balance, branch)
             values |= state.values
+            shares = contact_springs.contact_shares(state.balance, state.point.state)
             solved = process_time()
             if wears and file.scene.wears:
                 values |= operating_states.values_through(operating_states.worn_by(file, model))
@@ -105,7 +108,7 @@ def solve_setting(file: SceneFile, wears: bool = True) -> SolvedSetting:
             outcome = str(failure)
     end = process_time()
     pairs = model.reduced.interface.n_pair
-    return SolvedSetting(values, pairs, end - clock, end - solved, memory.peak(), outcome)
+    return SolvedSetting(values, pairs, end - clock, end - solved, memory.peak(), outcome, shares)
 
 
 def measure_ladders(

@@ -28,18 +28,23 @@ ORDERS = (0.5, 4.0)  # slower is not taken for settling; faster is not relied on
 SAFETY = 0.25  # of the extrapolated remainder that stays in doubt (Roache: a factor of 1.25 on three grids)
 SMALLEST = 1e-3  # size of a setting that leaves all out
 ROUNDING = 1e-9  # relative difference that means nothing
+STIFFER = tuple(4.0**power for power in range(6))  # springs over those of the scene, towards rigid
+SPRINGS = "contact_stiffness"
 
 
 @dataclass(frozen=True)
 class Setting:
-    """Overrides of a scene, and how fine they are: errors fall with a power of size."""
+    """Overrides of a scene, and how fine they are: errors fall with a power of size; name : None for the overrides."""
 
     size: float
     overrides: tuple[str, ...]
+    name: str | None = None
 
     @property
     def label(self) -> str:
-        """The overrides without their sections."""
+        """The name, or the overrides without their sections."""
+        if self.name is not None:
+            return self.name
         parts = [text.partition("=") for text in self.overrides]
         return ", ".join(f"{key.rpartition('.')[2]}={value}" for key, _, value in parts)
 
@@ -103,12 +108,13 @@ def ladders_of(scene: Scene, study: Study, names: Sequence[str] = ()) -> tuple[L
         available[name] = Ladder(name, tuple(settings), table.base, table.worn_up_to)
     for name, settings in _of_any(scene):
         if len(settings) > 1:
-            up_to = WORN_TOP if name == "harmonics" else math.inf
+            up_to = {"harmonics": WORN_TOP, SPRINGS: 0.0}.get(name, math.inf)
             available.setdefault(name, Ladder(name, tuple(settings), worn_up_to=up_to))
     missing = [name for name in names if name not in available]
     if missing:
         raise Refusal(f"--setting {missing[0]}: the scene has {', '.join(available)}")
-    chosen = [available[name] for name in names or available]
+    closed = any(contact.springs == "closed" for contact in scene.joints.values())
+    chosen = [available[name] for name in names or available if names or closed or name != SPRINGS]
     return tuple(replace(ladder, worn_up_to=0.0) if ladder.name in study.unworn else ladder for ladder in chosen)
 
 
@@ -124,6 +130,7 @@ def _of_any(scene: Scene) -> Iterator[tuple[str, list[Setting]]]:
             exact = Setting(EXACT, ("reduction.interface_modes=",))
             yield "interface_rank", [*_numbers("reduction.interface_modes", RANKS), exact]
     yield from _of_harmonics(scene)
+    yield SPRINGS, _of_stiffness(scene)
     yield "newton", [Setting(1 / value, (f"solver.tolerance={value:g}",)) for value in NEWTON]
     if scene.wears:
         rule = 'wear.rule="error_controlled"'
@@ -143,6 +150,30 @@ def _of_harmonics(scene: Scene) -> Iterator[tuple[str, list[Setting]]]:
         ]
         located = ("harmonics.samples=128", 'harmonics.transitions="located"')
         yield "samples", [*sampled, Setting(EXACT, located)]
+
+
+def _of_stiffness(scene: Scene) -> list[Setting]:
+    """Stiffer springs, of contacts that give a number for them, with the harmonics that they require."""
+    keys = {
+        f"{f'contacts.{name}' if name in getattr(scene, 'contacts', ()) else 'contact'}.{key}": value
+        for name, contact in scene.joints.items()
+        for key in ("tangential_stiffness", "normal_stiffness")
+        if (value := getattr(contact, key)) is not None and getattr(contact, "by_temperature", None) is None
+    }
+    if not keys:
+        return []
+    settings, harmonics = [Setting(1.0, (), "1 x")], scene.harmonics
+    for factor in STIFFER[1:]:
+        top = harmonic_with_springs(harmonics.top, factor)
+        highest = f"highest={top}" if harmonics.automatic else f"kept={list(range(harmonics.kept[0], top + 1))}"
+        finer = (f"harmonics.{highest}", f"harmonics.samples={max(harmonics.samples, 16 * top)}")
+        settings.append(Setting(factor, (*(f"{k}={factor * v!r}" for k, v in keys.items()), *finer), f"{factor:g} x"))
+    return settings
+
+
+def harmonic_with_springs(highest: int, factor: float) -> int:
+    """Highest harmonic with springs so many times as stiff: what they do takes less time, by the cube root of it."""
+    return math.ceil(max(highest, 3) * factor ** (1 / 3))
 
 
 def _numbers(key: str, values: Sequence[float]) -> list[Setting]:
@@ -198,6 +229,14 @@ def limit_of(size: Sequence[float], value: Sequence[float]) -> Limit:
         if ratio < -1:
             return Limit(last, float("nan"), float(abs(steps[1] / last)))
     return Limit(last, float("nan"), float(np.ptp(np.concatenate(groups)) / abs(last)))
+
+
+def springs_limit(factors: Sequence[float], values: Sequence[float], least: float) -> Limit | None:
+    """The limit without springs; None where the changes do not shrink, by half at least, or are below `least`."""
+    steps = np.abs(np.diff(values[-3:]))
+    if len(steps) < 2 or (steps[1] > 0.5 * steps[0] and steps[1] > least * abs(values[-1])):
+        return None
+    return limit_of(factors, values) if values[-1] else Limit(0.0, math.nan, 0.0)
 
 
 def _order(h: np.ndarray, ratio: float) -> float:

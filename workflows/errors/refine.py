@@ -42,6 +42,7 @@ def overrides_of(file: SceneFile, refinement: str, factor: float) -> tuple[str, 
         Refinement.WEAR_STEPS: finer_wear,
         Refinement.MOTION: finer_wear,
         Refinement.OTHER_MOTION: lambda: None,
+        Refinement.SPRINGS: lambda: None,
     }
     try:
         finer = refinements[refinement]()

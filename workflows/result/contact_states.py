@@ -120,13 +120,19 @@ def instant_status(result: Result, at: int) -> np.ndarray:
     loops, patch = result.loops, result.patch
     assert loops is not None
     force = loops.force[at]
-    status = np.full(force[:, 0].shape, STICKS)
-    tangential = [c for c, name in enumerate(patch.components) if name != "n"]
     if "n" not in patch.components:
-        return status
-    normal = force[:, patch.components.index("n")]
-    largest = max(float(np.abs(normal).max()), 1e-300)
-    limit = slip_limits(result, normal)
+        return np.full(force[:, 0].shape, STICKS)
+    return status_of(force, patch.components, slip_limits(result, force[:, patch.components.index("n")]))
+
+
+def status_of(force: np.ndarray, components: tuple[str, ...], limit: np.ndarray) -> np.ndarray:
+    """(n_pair, n_sample) whether each pair sticks, slips or is separated under a force (n_pair, n_component, n_sample).
+
+    limit : (n_pair, n_sample) tangential force at which a pair slips [N], nan where it has none"""
+    status = np.full(limit.shape, STICKS)
+    tangential = [c for c, name in enumerate(components) if name != "n"]
+    normal = force[:, components.index("n")] if "n" in components else None
+    largest = float(np.nan_to_num(np.abs(limit if normal is None else normal)).max(initial=1e-300))
     if np.isfinite(limit).any() and tangential:
         slip_force = limit - 1e3 * CLOSE * np.abs(limit) - CLOSE * largest
         largest_component, resultant = (
@@ -136,7 +142,7 @@ def instant_status(result: Result, at: int) -> np.ndarray:
         # where the limit holds for each direction alone, both together may pass it: then they are no sign of slip
         planar = ~(resultant > limit + 1e3 * CLOSE * largest).any(axis=1, keepdims=True)
         status = np.where(np.where(planar, resultant, largest_component) >= slip_force, SLIPS, status)
-    return np.where(normal <= CLOSE * largest, SEPARATES, status)
+    return status if normal is None else np.where(normal <= CLOSE * largest, SEPARATES, status)
 
 
 def over_a_cycle(result: Result, at: int, count: int) -> tuple[np.ndarray, np.ndarray]:

@@ -13,6 +13,7 @@ class Refinement(StrEnum):
     MESH = "mesh and contact grid"
     HARMONICS = "harmonics"
     SAMPLES = "samples"
+    SPRINGS = "contact springs"
     WEAR_STEPS = "wear steps"
     MOTION = "statistics of the motion"
     OTHER_MOTION = "another motion"

@@ -17,6 +17,7 @@ from tribodyn.workflows.scene.fields import (
     CONTACT,
     PART,
     SMOOTH,
+    STUDY,
     Angle,
     Direction,
     Length,
@@ -101,6 +102,9 @@ class ContactTable(LawTable):
     """Tangential stiffness of all pairs together."""
     normal_stiffness: Annotated[Stiffness, Field(gt=0, le=1e16), CONTACT, SMOOTH] | None = None
     """Normal stiffness of all pairs together."""
+    springs: Annotated[Literal["compliance", "closed"], STUDY] = "compliance"
+    """What the springs stand for: a "compliance" that the joint has, or a "closed" contact without any; then the errors
+    have a row for what the springs do, by the limit of stiffer ones."""
     table: Annotated[tuple[tuple[float, ...], ...] | None, CONTACT] = None
     """File of the law's own table beside the scene, comma-separated numbers, or its rows; where the law takes one. Left
     out, it is that of the measured faces in [surfaces], and so is the law's radius."""

@@ -24,6 +24,7 @@ from tribodyn.workflows.errors.ladder_table import (
     LadderTables,
     measure_ladders,
 )
+from tribodyn.workflows.errors.ladders import SPRINGS
 from tribodyn.workflows.pictures.theme import GREY, STYLE
 from tribodyn.workflows.result.summary import plain
 from tribodyn.workflows.run.progress import Report, reporter
@@ -90,6 +91,7 @@ def _record(scene: str, ladder: LadderTable, row: LadderRow) -> dict[str, Any]:
             "bounds": {q: ladder.bound(row, q) for q in names_with_error()},
             "orders": {q: limit.order for q, limit in ladder.limits.items()},
             "seconds": measured.seconds, "memory": measured.memory, "outcome": measured.outcome,
+            "shares": measured.shares and dict(zip(("open", "stick", "slip"), measured.shares, strict=True)),
         }
     )  # fmt: skip
 
@@ -100,10 +102,12 @@ def _lines(ladder: LadderTable) -> Iterator[str]:
     yield _line(ladder.ladder.name.ljust(width), "pairs", "seconds", "MB", [_name(q) for q in shown], "")
     for row in ladder.rows:
         measured = row.solved
-        failed = "" if measured.outcome == SOLVED else f"  {measured.outcome}"
+        end = "" if measured.outcome == SOLVED else f"  {measured.outcome}"
+        if measured.shares is not None and ladder.ladder.name == SPRINGS:
+            end += "  open {:.3f}, stick {:.3f}, slip {:.3f}".format(*measured.shares)
         cells = [_cell(ladder, row, q) for q in shown]
         numbers = str(measured.pairs), f"{measured.seconds:.2f}", f"{measured.memory / 1e6:.0f}"
-        yield _line(row.setting.label.ljust(width), *numbers, cells, failed)
+        yield _line(row.setting.label.ljust(width), *numbers, cells, end)
     limits = [f"{ladder.limits[q].value:.5g} ({_order(ladder.limits[q].order)})" for q in shown]
     yield _line("limit".ljust(width), "", "", "", limits, "")
     for q in shown:
