@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 import scipy
 
-from tests.fem.test_stress import STEEL, brick
+from tests.helpers.bent_blocks import STEEL, brick
 from tribodyn.fem.constraints import Clamp
 from tribodyn.fem.elements import connectivity
 from tribodyn.fem.factor import factorise
