@@ -29,7 +29,8 @@ PAGE = FOLDER / "gallery" / "pictures.md"
 DPI, FILM_DPI, FILM_IMAGES = 100, 55, 16
 COLOURS = 256  # of a picture on the site
 ELSEWHERE = {
-    ("beam", "patch"): "beam_patch", ("beam", "frf"): "beam_frf", ("blade", "wheel"): "blade_wheel",
+    ("vane", "patch"): "vane_patch", ("vane", "frf"): "vane_frf", ("beam", "frf"): "beam_frf",
+    ("beam", "patch"): "beam_patch", ("blade", "wheel"): "blade_wheel",
     ("brb_flat", "patch"): "brb_patch", ("brb_flat", "part"): "brb_part", ("turbine", "frf"): "turbine_frf",
     ("turbine", "patch"): "turbine_patch", ("turbine", "wheel"): "turbine_wheel",
 }  # fmt: skip
@@ -104,8 +105,8 @@ def of_scene(name: str, folder: Path) -> Iterator[Path]:
                 )  # fmt: skip
                 print(f"  film over {over}: {(time.process_time() - spent) / FILM_IMAGES:.2f} s of processor an image")
                 yield Path(shutil.copy(film, PICTURES / f"{name}_film_{over}.gif"))
-        if name == "beam":
-            story(result, FOLDER / "figures" / "beam_story.png", Path(place))
+        if name == "vane":
+            story(result, FOLDER / "figures" / "vane_story.png", Path(place))
 
 
 def story(result: td.Result, path: Path, place: Path) -> Path:

@@ -24,7 +24,7 @@ FOLLOWED = (
     "howto/deck", "howto/step", "howto/inspect",
 )  # fmt: skip
 FENCE = re.compile(r"^```([a-z]+)(?: ([\w.]+))?\n(.*?)^```\n", re.M | re.S)
-FIRST = "./tribodyn run beam"
+FIRST = "./tribodyn run vane"
 LINE_LIMIT = 30  # lines of an output
 
 

@@ -165,7 +165,11 @@ class StressOverCycle:
 class StressField(Protocol):
     """Computes the stress of a whole part; kinds : (n_node,) what stands at each node, of fem.singularities.KINDS.
 
-    omitted : what the modes left out carry, None where that is not known"""
+    omitted : what the modes left out carry, None where that is not known; is_searched : whether the largest of the
+    part is asked for"""
+
+    @property
+    def is_searched(self) -> bool: ...
 
     @property
     def kinds(self) -> np.ndarray: ...

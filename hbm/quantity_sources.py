@@ -69,7 +69,8 @@ class SolvedCycle:
             state.omega, basis, response, float(amplitude(response[row], basis.harmonics)), row, balance.preload(state),
             balance.energy(state), balance.normal_force(state), state.x, state.cycle.force, contact.components,
             {joint.name: joint.rows for joint in contact.joints}, driven=min(loaded), wear_coefficient=rate,
-            places=balance.places, whole=None if stress is None else cache(lambda: stress.of_state(balance, state)),
+            places=balance.places,
+            whole=cache(lambda: stress.of_state(balance, state)) if stress is not None and stress.is_searched else None,
         )  # fmt: skip
 
     @classmethod

@@ -63,10 +63,18 @@ def test_the_long_commands_of_a_page_run(page: Path, tmp_path: Path) -> None:
 
 
 def test_the_first_command_draws_what_is_shown(after_the_first_command: Path) -> None:
-    pictures = after_the_first_command / "results/beam/pictures"
+    pictures = after_the_first_command / "results/vane/pictures"
     curves = {"frf", "cycles_per_step", "peak", "preload", "depth", "energy", "status", "hysteresis"}
-    assert {path.stem for path in pictures.glob("*.png")} == curves | {"patch", "status_maps", "part", "contact"}
-    with Image.open(ROOT / "docs/figures/beam_patch.png") as page, Image.open(pictures / "patch.png") as drawn:
+    assert {path.stem for path in pictures.glob("*.png")} == curves | {
+        "patch",
+        "status_maps",
+        "part",
+        "contact",
+        "stress",
+        "haigh",
+        "fatigue",
+    }
+    with Image.open(ROOT / "docs/figures/vane_patch.png") as page, Image.open(pictures / "patch.png") as drawn:
         # the unworn state alone: rounding on another processor changes where the contact wears later
         shown, built = (item.crop((0, 0, item.width // 3, item.height)) for item in (page, drawn))
         size = shown.width // 8, shown.height // 8
@@ -81,7 +89,7 @@ def test_the_readme_shows_what_the_first_command_prints(after_the_first_command:
     The contact wears along a motion that never repeats itself, which rounding on another processor changes: numbers
     are the same within what their statistics allow, the life within its error, and the words but for lines of wear."""
     (shown,) = [fence.text for fence in fences(README) if fence.language == "text"]
-    printed = "\n".join(text.brief(td.load(after_the_first_command / "results/beam"))) + "\n"
+    printed = "\n".join(text.brief(td.load(after_the_first_command / "results/vane"))) + "\n"
     number = re.compile(r"\d+(?:\.\d+)?")
     by_rounding = re.compile("cycles|life|opens|depth|worn  |in the end|end of wear|leaves it")
     firm = [[line for line in lines.splitlines()[1:] if not by_rounding.search(line)] for lines in (shown, printed)]
@@ -93,7 +101,7 @@ def test_the_readme_shows_what_the_first_command_prints(after_the_first_command:
         for old, new in zip(map(float, number.findall(before)), map(float, number.findall(now)), strict=True):
             allowed = 0.5 if of_an_error and old == float(of_an_error[1]) else 0.03
             assert abs(new - old) <= allowed * old, (before, now)
-    of_wear = [re.search(r"life +(\d+) million cycles +([\d.]+) %", lines) for lines in (shown, printed)]
+    of_wear = [re.search(r"life +([\d.]+) billion cycles +([\d.]+) %", lines) for lines in (shown, printed)]
     assert of_wear[0] is not None
     assert of_wear[1] is not None, printed
     (refined, _), (current, error) = (map(float, result.groups()) for result in of_wear if result is not None)
@@ -167,12 +175,12 @@ def exists(names: list[str]) -> bool:
 def test_the_paper_states_what_the_first_command_prints() -> None:
     """Its numbers are those of the README, which are those of the command."""
     paper = (ROOT / "paper/paper.md").read_text(encoding="utf-8")
-    match = re.search(r"`tribodyn run beam`.*?about a minute", paper, re.DOTALL)
+    match = re.search(r"`tribodyn run vane`.*?about a minute", paper, re.DOTALL)
     (shown,) = [fence.text for fence in fences(README) if fence.language == "text"]
-    numbers = re.findall(r"\d[\d.]*(?: million cycles| DOFs| %)?", match[0])
+    numbers = re.findall(r"\d[\d.]*(?: billion cycles| DOFs| %)?", match[0])
     assert len(numbers) >= 4
     assert [number for number in numbers if number not in shown] == []
-    life = re.search(r"life +(\d+ million cycles) +([\d.]+ %)", shown)
+    life = re.search(r"life +([\d.]+ billion cycles) +([\d.]+ %)", shown)
     assert "{} with an error of {}".format(*life.groups()) in " ".join(match[0].split())
 
 

@@ -213,5 +213,6 @@ def _cycle_at(result: Result, wear: WearHistory, row: int) -> SolvedCycle:
 
 def _with_stress(result: Result, cycle: SolvedCycle, number: int) -> SolvedCycle:
     """The cycle of a row or point with the stress of the whole part, where the result holds it."""
-    stress = None if result.stress_field is None else result.stress_field.of(number)
+    field = result.stress_field
+    stress = None if field is None or not field.spot.shape[1] else field.of(number)
     return cycle if stress is None else replace(cycle, whole=lambda: stress)

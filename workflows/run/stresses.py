@@ -91,7 +91,8 @@ def with_stress(scene: MeshScene, part: Part, balance: HarmonicBalance, folder: 
         places.append(StressPlace(name, first, held_back, strength, left))
     nodes = {name: _place(scene, part.mesh, name).nearest for name in scene.stress_places}
     omitted = None if len(part.held_rows) else OmittedModes.of(balance.model, part.system)
-    stress = PartStress(part, material, heat, tuple(strengths), nodes, omitted)
+    is_searched = scene.stress is None or scene.stress.hot_spots > 0
+    stress = PartStress(part, material, heat, tuple(strengths), nodes, omitted, is_searched)
     return replace(balance, places=tuple(places), stress=stress)
 
 
@@ -101,7 +102,8 @@ class PartStress:
 
     material : as for fem.elasticity.assemble; temperature : (n_node,) change [K] under the static loads, None for none
     strengths : of the materials of all bodies, body by body, None where the scene does not say
-    nodes : nearest to the named places; omitted : what the modes left out carry, None where that is not known"""
+    nodes : nearest to the named places; omitted : what the modes left out carry, None where that is not known
+    is_searched : whether the largest of the part is asked for"""
 
     part: Part
     material: Any
@@ -109,6 +111,7 @@ class PartStress:
     strengths: tuple[Strength | None, ...]
     nodes: Mapping[str, int]
     omitted: OmittedModes | None = None
+    is_searched: bool = True
 
     @cached_property
     def kinds(self) -> np.ndarray:

@@ -39,7 +39,7 @@ class StressTable(Table, stage=PART):
     """Places by name, whose stress is a number of the run like its amplitude, with its error and derivatives."""
     hot_spots: Annotated[StrictInt, Field(ge=0, le=20), DRAW] = 3
     """How many places of the largest stress the program looks for in the states that pictures show, apart from each
-    other."""
+    other; with 0 the largest stress and utilisation of the part are not stated."""
 
 
 class GaugeTable(Table, stage=PART):
