@@ -77,28 +77,17 @@ class Layout:
 LAYOUT = Layout()
 
 STYLE: dict[str, Any] = {
-    "figure.dpi": LAYOUT.dpi,
-    "savefig.dpi": LAYOUT.dpi,
+    **dict.fromkeys(("figure.dpi", "savefig.dpi"), LAYOUT.dpi),
+    **dict.fromkeys(("font.size", "axes.titlesize", "figure.titlesize", "legend.fontsize"), LAYOUT.font),
+    **dict.fromkeys(("axes.edgecolor", "axes.labelcolor", "xtick.color", "ytick.color", "text.color"), INK),
+    **dict.fromkeys(("axes.spines.top", "axes.spines.right", "legend.frameon"), False),
+    **dict.fromkeys(("axes.grid", "axes.axisbelow"), True),
     "font.family": ["STIXGeneral", "DejaVu Serif"],  # come with matplotlib; look like the text of a paper
     "mathtext.fontset": "stix",
     "pdf.fonttype": 42,  # text stays text
     "svg.fonttype": "path",
-    "font.size": LAYOUT.font,
-    "axes.edgecolor": INK,
-    "axes.labelcolor": INK,
-    "axes.titlesize": LAYOUT.font,
-    "figure.titlesize": LAYOUT.font,
     "axes.titlelocation": "left",
-    "axes.grid": True,
-    "axes.spines.top": False,
-    "axes.spines.right": False,
-    "axes.axisbelow": True,
     "grid.color": "#dfe2e6",
     "grid.linewidth": 0.6,
     "lines.linewidth": LAYOUT.line,
-    "legend.frameon": False,
-    "legend.fontsize": LAYOUT.font,
-    "xtick.color": INK,
-    "ytick.color": INK,
-    "text.color": INK,
 }

@@ -187,11 +187,9 @@ class Stress:
     def of(self, number: int) -> StressOverCycle | None:
         """The stress in the state of a row; None where it was not computed there."""
         at = np.flatnonzero(self.row == number)
-        return (
-            StressOverCycle(**{f.name: getattr(self, f.name)[at[0]] for f in fields(StressOverCycle)})
-            if len(at)
-            else None
-        )
+        if not len(at):
+            return None
+        return StressOverCycle(**{f.name: getattr(self, f.name)[at[0]] for f in fields(StressOverCycle)})
 
 
 @dataclass(frozen=True)
