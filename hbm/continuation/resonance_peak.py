@@ -45,6 +45,7 @@ class AtPeak:
     first_stride : first step from a neighbouring peak, in half widths of the resonance
     outside_reach : half widths between the points next to a maximum of a scan, by which its peak may lie outside them
     max_refined : maxima of a scan that are refined in turn, the highest first
+    max_growth : of the response, over that at an end of the range, beyond which a resonance is unbounded
     Those from `scan_harmonic_above` on: see docs/accuracy/ablations.md"""
 
     output: str
@@ -65,6 +66,7 @@ class AtPeak:
     first_stride: float = 0.02
     outside_reach: float = 2.0
     max_refined: int = 3
+    max_growth: float = 1e5
     newton: NewtonOptions = field(default_factory=NewtonOptions)
 
     @single
@@ -97,14 +99,20 @@ class AtPeak:
         """The peak of the curve round a search that has failed, followed round its folds; else the failed one."""
         start, stop = sorted((self.start, self.stop))
         near = [peak.state.omega * share for share in (1 - self.same_peak, 1 + self.same_peak)]
+        options = arc_length.Options(max_growth=self.max_growth, newton=self.newton)
         for low, high in ((start, stop), (max(near[0], start), min(near[1], stop))):
-            curve = arc_length.follow(balance, low, high, arc_length.Options(newton=self.newton))
+            curve = arc_length.follow(balance, low, high, options)
+            if np.linalg.norm(curve.contact[-1]) > self.max_growth * np.linalg.norm(curve.contact[0]) > 0:
+                hertz = f"{curve.omega[-1] / (2 * np.pi):.5g} Hz"
+                detail = f" {peak.solves} solves: nothing limits the resonance at {hertz}, neither damping nor friction"
+                break
             if curve.arrived and not curve.no_peak(self.output):
                 on_arc = peak_on_arc(balance, curve, curve.highest(self.output), self)
                 lowest = (1 - self.tolerance) * peak.amplitude
                 if on_arc is not None and on_arc.solution.converged and on_arc.amplitude > lowest:
                     return replace(on_arc, solves=peak.solves + len(curve.omega) + on_arc.solves)
-        detail = f"{peak.solution.outcome.detail}; by arc length the curve {curve.end}, without a peak"
+        else:
+            detail = f"{peak.solution.outcome.detail}; by arc length the curve {curve.end}, without a peak"
         return replace(peak, solution=replace(peak.solution, outcome=SolveEnd.SITE_NOT_FOUND.say(detail)))
 
     @single

@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from tests.helpers.continuation_models import rubbing_mass
 from tests.helpers.pressed_body import balance_of, pressed_body
 from tribodyn.hbm.continuation import highest_peak
 from tribodyn.hbm.continuation.methods import adaptive
@@ -51,3 +52,13 @@ def test_the_peak_is_the_one_that_its_slope_finds() -> None:
     assert selection == 0
     assert result.amplitude == pytest.approx(exact.amplitude, rel=1e-4)
     assert result.state.omega == pytest.approx(exact.state.omega, rel=1e-3)
+
+
+def test_a_resonance_that_nothing_limits_is_no_peak():
+    """Above 4 mu N / pi the force works more than friction, and without damping the response has no bound."""
+    site, undamped = AtPeak("mass", 0.5, 3.0), rubbing_mass(zeta=0.0)
+    assert site.solve(rubbing_mass().with_load(2.0)).solution.converged
+    assert site.solve(undamped.with_load(1.5)).solution.converged
+    unbounded = site.solve(undamped.with_load(2.0))
+    assert "nothing limits the resonance at 0.159" in str(unbounded.solution.outcome)
+    assert unbounded.solves < 150

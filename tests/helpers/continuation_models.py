@@ -85,14 +85,14 @@ class Lifting:
 
 
 def rubbing_mass(
-    harmonics: tuple[int, ...] = (0, 1), n_samples: int = 128, transitions: str = "sampled"
+    harmonics: tuple[int, ...] = (0, 1), n_samples: int = 128, transitions: str = "sampled", zeta: float = 0.01
 ) -> HarmonicBalance:
     """A pressed mass on a Jenkins element that sticks far from its resonance and slips in it."""
     parameters = ContactParameters.of(("t1", "n"), [[3.0, 5.0]], friction=0.5)
     excitation = Excitation.of({"normal": 1.0}, {1: {"force": 0.3}})
     basis = HarmonicBasis(harmonics, n_samples, transitions)
     return HarmonicBalance.of(
-        oscillator(1.0, 1.0, 0.01), Joint("contact", "jenkins", parameters), basis, excitation, 5.0
+        oscillator(1.0, 1.0, zeta), Joint("contact", "jenkins", parameters), basis, excitation, 5.0
     )
 
 

@@ -104,7 +104,7 @@ def choose_harmonics(
             choice = harmonic_choice.choose(balance, frequencies, options, solved_x | places)
         except harmonic_choice.NotSolved:
             break
-        if choice.harmonics == balance.basis.harmonics:
+        if not places or choice.harmonics == balance.basis.harmonics:
             break
         balance, solved_x = choice.balance, dict(zip(choice.omega, choice.x, strict=True))
     return choice
