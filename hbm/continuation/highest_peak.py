@@ -72,8 +72,7 @@ def highest(
 
     branch : the response, points on both sides of its peaks; site : how a peak is searched, whatever its output
     Solves are those of the whole search, points of the branch among them"""
-    rows = [branch.output_names.index(name) for name in outputs]
-    heights = amplitude(branch.response[:, rows], branch.harmonics)
+    heights = amplitude(branch.response[:, [*map(branch.output_names.index, outputs)]], branch.harmonics)
     best: OperatingPoint | None = None
     solves, doubt, row = len(heights), RULES.least_doubt, 0
     for point, output in candidates(branch.omega, heights):

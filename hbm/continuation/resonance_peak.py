@@ -89,22 +89,19 @@ class AtPeak:
         branch = self._scan(balance)
         if branch.end.kind is BranchEnd.ENDED:
             backward = replace(self, start=self.stop, stop=self.start)._scan(balance)
-            branch = max(
-                branch, backward, key=lambda scan: float(scan.amplitude(self.output)[scan.converged].max(initial=0.0))
-            )
+            heights = [scan.amplitude(self.output)[scan.converged].max(initial=0.0) for scan in (branch, backward)]
+            branch = backward if heights[1] > heights[0] else branch
         peak = self._highest(balance, branch, self._candidates(branch))
         return peak if peak.solution.converged else self._by_arc_length(balance, peak)
 
     def _by_arc_length(self, balance: HarmonicBalance, peak: OperatingPoint) -> OperatingPoint:
         """The peak of the curve round a search that has failed, followed round its folds; else the failed one."""
-        start, stop = sorted((self.start, self.stop))
+        (start, stop), growth = sorted((self.start, self.stop)), self.max_growth
         near = [peak.state.omega * share for share in (1 - self.same_peak, 1 + self.same_peak)]
-        options = arc_length.Options(max_growth=self.max_growth, newton=self.newton)
         for low, high in ((start, stop), (max(near[0], start), min(near[1], stop))):
-            curve = arc_length.follow(balance, low, high, options)
-            if np.linalg.norm(curve.contact[-1]) > self.max_growth * np.linalg.norm(curve.contact[0]) > 0:
-                hertz = f"{curve.omega[-1] / (2 * np.pi):.5g} Hz"
-                detail = f" {peak.solves} solves: nothing limits the resonance at {hertz}, neither damping nor friction"
+            curve = arc_length.follow(balance, low, high, arc_length.Options(max_growth=growth, newton=self.newton))
+            if np.linalg.norm(curve.contact[-1]) > growth * np.linalg.norm(curve.contact[0]) > 0:
+                detail = f" {peak.solves} solves: nothing limits the resonance at {curve.omega[-1] / 2 / np.pi:.5g} Hz"
                 break
             if curve.arrived and not curve.no_peak(self.output):
                 on_arc = peak_on_arc(balance, curve, curve.highest(self.output), self)
@@ -145,9 +142,8 @@ class AtPeak:
         result = DominantPeak()
         for start, stop, reduced in ranges:
             if result.point is None and stop > start:
-                higher = replace(self, start=start, stop=stop)._higher_peak(reduced, balance, point)
-                nearness = max(result.nearness, higher.nearness)
-                result = DominantPeak(higher.point, result.solves + higher.solves, nearness)
+                peak = replace(self, start=start, stop=stop)._higher_peak(reduced, balance, point)
+                result = DominantPeak(peak.point, result.solves + peak.solves, max(result.nearness, peak.nearness))
         return result
 
     @single
@@ -243,9 +239,8 @@ class AtPeak:
         for row in maxima[: self.max_refined]:
             neighbours = branch.omega[row - 1 : row + 2]
             width = float(np.ptp(neighbours)) / 2
-            reach = self.outside_reach * width
+            reach, omega = self.outside_reach * width, float(branch.omega[row])
             limits = float(neighbours.min()) - reach, float(neighbours.max()) + reach
-            omega = float(branch.omega[row])
             solved_x = {omega: balance.shaped(branch.contact[row])}
             peak = PeakRefinement(self, balance, omega, solved_x, 0.5 * width, limits).run()
             solves += peak.solves
@@ -280,9 +275,8 @@ class AtPeak:
         raise NoPeak(
             f"no resonance peak of {self.output} lies between {span}: the response still rises towards the "
             f"{'lower' if end == low else 'upper'} end at {end:.5g} Hz; extend response.frequency beyond it, "
-            "or name a frequency in wear.at",
-            branch,
-        )
+            "or name a frequency in wear.at", branch,
+        )  # fmt: skip
 
 
 def _transferred(source: HarmonicBalance, point: OperatingPoint, target: HarmonicBalance) -> np.ndarray:
