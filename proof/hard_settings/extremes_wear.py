@@ -12,7 +12,7 @@ from tribodyn.hbm.outcome import WearEnd
 from tribodyn.hbm.wear.history import LIFE_SHARE, WearHistory
 from tribodyn.hbm.wear.law import JointWear
 from tribodyn.hbm.wear.rules import error_controlled, thesis
-from tribodyn.hbm.wear.step_control import UNKNOWN, Tolerance, first_order_error, measured_error
+from tribodyn.hbm.wear.step_control import Tolerance, first_order_error, measured_error
 from tribodyn.hbm.wear.wear_loop import evolve
 from tribodyn.hbm.wear.wear_problem import Duty, WearProblem
 from tribodyn.workflows.run.references import free_deflection
@@ -21,7 +21,7 @@ STEPS = (1e-9, 1e-6, 1e-4, 1e-3, 1e-2, 0.05, 0.1, 0.2, 0.5, 1.0, 10.0, 1e3, 1e6)
 TOLERANCES = (1e-6, 1e-4, 1e-3, 0.01, 0.03, 0.1, 0.3, 0.9)
 COEFFICIENTS = (0.0, 1e-30, 1e-18, 1e-9, 1.0, 1e9)  # m3/J
 ORDINARY = 2e-15  # m3/J
-MOST_STEPS = 150
+MOST_STEPS, UNKNOWN = 150, 0.5  # UNKNOWN: error of a number of cycles from which on it is no statement
 TIGHT = 3e-3  # tolerance of the reference
 
 Cell = tuple[str, str, str, Callable[[], Verdict]]
