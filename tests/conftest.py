@@ -13,11 +13,12 @@ import pytest
 ROOMS = ("geometry", "fem", "reduction", "hbm", "workflows", "properties", "proof", "cases", "documentation")
 PROCESSES = ("subprocess", "multiprocessing")  # a test module that imports one of them starts processes
 LONG = (  # more than 12 s of processor each, the longest first
-    "test_pages", "test_errors", "test_scene_brb", "test_lives", "test_rig", "test_contact_events", "test_turbine",
-    "test_blade_study", "test_scene_leaf_seal", "test_wear_rules", "test_run", "test_only_what_is_needed",
-    "test_extremes", "test_pictures", "test_continuation_arc_length", "test_scene_blade", "test_large", "test_study",
-    "test_cli", "test_fit_file", "test_convergence", "test_operating_line", "test_optimise", "test_report",
-    "test_travelling_wave",
+    "test_pages", "test_errors", "test_rig", "test_stress", "test_lives", "test_scene_brb", "test_own_part",
+    "test_contact_events", "test_run", "test_blade_study", "test_turbine", "test_properties_solver", "test_report",
+    "test_scene_leaf_seal", "test_only_what_is_needed", "test_wear_steps", "test_operating_line", "test_convergence",
+    "test_scene_blade", "test_wear_laws", "test_optimise", "test_structure", "test_cli", "test_scoreboard",
+    "test_wear_rules", "test_extremes", "test_pictures", "test_continuation_arc_length", "test_large", "test_study",
+    "test_fit_file", "test_travelling_wave",
 )  # fmt: skip
 TESTS = Path(__file__).parent
 
