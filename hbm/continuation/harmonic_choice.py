@@ -107,7 +107,8 @@ def choose(
     options = options or ChoiceOptions()
     wide = widened(balance, options.highest)
     loaded = {h for (h, _), value in balance.excitation.loads.items() if value != 0}
-    loaded |= {0} if balance.basis.has_static else set()
+    if balance.basis.has_static:
+        loaded.add(0)
     solved_x = solved_x or {}
     harmonics = tuple(sorted({*loaded, 1, *(balance.basis.harmonics if solved_x else ())}))
     starts = [[balance.basis.transfer(solved_x[w], wide.basis)] if w in solved_x else [] for w in omega]
