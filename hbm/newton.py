@@ -26,7 +26,7 @@ from tribodyn.reduction.residual_flexibility import FlexibleModel, ResidualFlexi
 
 @dataclass(frozen=True)
 class NewtonRules:
-    """What Newton takes for zero, for rounding, and for too large; see docs/accuracy/ablations.md."""
+    """What Newton takes for zero, for rounding, and for too large; see docs/developers/ablations.md."""
 
     unresisted: float = 1e-9  # singular value over the largest of a Jacobian whose motion counts as not resisted
     most_dense: int = 3000  # unknowns up to which the dense Jacobian serves where Krylov steps fail at rest

@@ -16,7 +16,7 @@ from tribodyn.hbm.outcome import CONVERGED
 
 @dataclass(frozen=True)
 class CurveRules:
-    """How a step along a curve and a fold within it are judged; see docs/accuracy/ablations.md."""
+    """How a step along a curve and a fold within it are judged; see docs/developers/ablations.md."""
 
     kink_angle: float = 0.75  # turn between neighbouring points beyond which they lie on either side of a kink [rad]
     # of Newton's tolerance elsewhere: near a fold the state goes as the root of the parameter

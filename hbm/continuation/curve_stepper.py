@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class CurveStepRules:
-    """How long the steps along a curve are; see docs/accuracy/ablations.md."""
+    """How long the steps along a curve are; see docs/developers/ablations.md."""
 
     # the characteristic length falls to this share per point where the vibration gets small
     least_length_ratio: float = 0.8

@@ -46,7 +46,7 @@ class AtPeak:
     outside_reach : half widths between the points next to a maximum of a scan, by which its peak may lie outside them
     max_refined : maxima of a scan that are refined in turn, the highest first
     max_growth : of the response, over that at an end of the range, beyond which a resonance is unbounded
-    Those from `scan_harmonic_above` on: see docs/accuracy/ablations.md"""
+    Those from `scan_harmonic_above` on: see docs/developers/ablations.md"""
 
     output: str
     start: float

@@ -32,7 +32,7 @@ SLIDING_STEPS = 400  # of Newton on the whole way to its own friction
 
 @dataclass(frozen=True)
 class StiffeningRules:
-    """How far the contact is softened, and when the end is a solution; see docs/accuracy/ablations.md.
+    """How far the contact is softened, and when the end is a solution; see docs/developers/ablations.md.
 
     decades : by which the springs are softened at most
     most_steps : of Newton on the whole way; hasty : of them at one stiffness: those that converge take fewer

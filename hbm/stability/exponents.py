@@ -39,7 +39,7 @@ _WAVES: WeakKeyDictionary[ContactCompliance, WaveModes] = WeakKeyDictionary()  #
 
 @dataclass(frozen=True)
 class HillRules:
-    """What Hill's method keeps and takes for rounding; see docs/accuracy/ablations.md."""
+    """What Hill's method keeps and takes for rounding; see docs/developers/ablations.md."""
 
     fewest_modes: int = 20  # friction makes modes far above the excitation flutter, too
     most_modes: int = 30

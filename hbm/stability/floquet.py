@@ -25,7 +25,7 @@ MOTION_TOLERANCE = 0.2  # largest difference of the vibration at the contact, re
 
 @dataclass(frozen=True)
 class MultiplierRules:
-    """How far multipliers are known, and what they may cost; see docs/accuracy/ablations.md."""
+    """How far multipliers are known, and what they may cost; see docs/developers/ablations.md."""
 
     # of a perturbation over a period, below which the multipliers of so many steps cannot tell it from none
     growth: float = 1e-3

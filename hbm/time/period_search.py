@@ -16,7 +16,7 @@ from tribodyn.hbm.time.time_step import Moving, Record
 
 @dataclass(frozen=True)
 class SearchRules:
-    """How a periodic motion is searched; see docs/accuracy/ablations.md."""
+    """How a periodic motion is searched; see docs/developers/ablations.md."""
 
     thrown_off: float = 4.0  # drift, over the smallest one, from which on past periods no longer tell where to go
     lost: float = 100.0  # ... from which on mixing does not come back by itself: the motion leaves the periodic one

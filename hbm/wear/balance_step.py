@@ -25,7 +25,7 @@ from tribodyn.hbm.wear.wear_rule import WearStep
 
 @dataclass(frozen=True)
 class StepRules:
-    """How the steps are placed; see docs/accuracy/ablations.md."""
+    """How the steps are placed; see docs/developers/ablations.md."""
 
     error_trend_power: float = 0.2  # power with which an error that grows from step to step holds the next one back
     # a peak that moves further than LARGEST_SHIFT is another one, unless it moves less than so many times as far as the

@@ -28,7 +28,7 @@ GAMMA = 1 - 1 / np.sqrt(2)
 
 @dataclass(frozen=True)
 class StageRules:
-    """How the frequencies of a stage are searched; see docs/accuracy/ablations.md."""
+    """How the frequencies of a stage are searched; see docs/developers/ablations.md."""
 
     max_corrections: int = 12  # solves of a stage
     retreats: int = 4  # of them at most, half way back, where no solution is found at a frequency that is tried

@@ -21,7 +21,7 @@ from tribodyn.hbm.wear.wear_problem import WearProblem, WearState
 
 @dataclass(frozen=True)
 class EventRules:
-    """How events are located; see docs/accuracy/ablations.md."""
+    """How events are located; see docs/developers/ablations.md."""
 
     # shares of an event's preload between which a step that would pass the event must end: just below it, so that the
     # next step starts beyond it

@@ -11,7 +11,7 @@ from tribodyn.hbm.contact import contact_law
 from tribodyn.hbm.wear import law as wear_law, wear_rule
 from tribodyn.workflows.scene import scene_file
 
-PAGE = ROOT / "docs/project/contributing.md"
+PAGE = ROOT / "docs/developers/contributing.md"
 PATH = re.compile(r"`((?:docs(?!/_build)|geometry|hbm|src|tests|workflows)/[\w./]*)`")
 
 

@@ -6,7 +6,7 @@ import re
 from tests.helpers.pages import ROOT
 from tribodyn import hbm
 
-PAGE = (ROOT / "docs/accuracy/measured.md").read_text(encoding="utf-8")
+PAGE = (ROOT / "docs/developers/measured.md").read_text(encoding="utf-8")
 
 
 def test_the_map_of_the_solver_names_every_module() -> None:

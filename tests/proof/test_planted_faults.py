@@ -38,7 +38,7 @@ def test_every_planted_fault_still_has_its_place() -> None:
     assert {fault.file.partition("/")[0] for fault in faults} == {"fem", "reduction", "hbm", "workflows"}
     assert [test for room in rooms.values() for test in room.tests if not (TREE / test).exists()] == []
     assert {run for room in rooms.values() for run in room.runs} == set(reference_runs.RUNS)
-    with (TREE / "docs" / "accuracy" / "planted_faults.csv").open(encoding="utf-8") as file:
+    with (TREE / "docs" / "developers" / "planted_faults.csv").open(encoding="utf-8") as file:
         shown = [row["fault"] for row in csv.DictReader(file)]
     assert sorted(shown) == sorted(fault.effect for fault in faults)
 

@@ -12,7 +12,7 @@ from proof.unseen_scenes.scoreboard import Judged, Row
 
 SEED = 2
 SCENES = (12, 7)  # a beam and a plate that take a second each
-COUNTED = Path(__file__).parents[2] / "docs" / "accuracy" / "scoreboard_rows.jsonl"
+COUNTED = Path(__file__).parents[2] / "docs" / "developers" / "scoreboard_rows.jsonl"
 
 
 @pytest.fixture(scope="module")

@@ -27,7 +27,7 @@ from tribodyn.refusal import Refusal
 
 @dataclass(frozen=True)
 class AdaptiveRules:
-    """When a step is taken back, and when the response has jumped; see docs/accuracy/ablations.md.
+    """When a step is taken back, and when the response has jumped; see docs/developers/ablations.md.
 
     least_error_share : of the miss of extrapolation that counts as error of interpolation. On a smooth curve the share
         follows from the fourth derivative and may vanish; next to a kink that formula does not hold

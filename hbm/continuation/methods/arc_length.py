@@ -33,7 +33,7 @@ from tribodyn.refusal import Refusal
 
 @dataclass(frozen=True)
 class ArcLengthRules:
-    """What a walk does where the curve ends, turns into itself or brings nothing; see docs/accuracy/ablations.md.
+    """What a walk does where the curve ends, turns into itself or brings nothing; see docs/developers/ablations.md.
 
     gap_steps : of the parameter over a gap in the curve, shares of its range, tried in turn; the last one, which could
         miss a peak, along the load, too

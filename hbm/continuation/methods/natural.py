@@ -26,7 +26,7 @@ EXTRAPOLATION_DEGREE = 2  # higher ones amplify the kinks of the contact
 
 @dataclass(frozen=True)
 class NaturalRules:
-    """How a step that fails is made all the same; see docs/accuracy/ablations.md.
+    """How a step that fails is made all the same; see docs/developers/ablations.md.
 
     least_spacing : of the points extrapolated from, in steps: closer ones amplify what Newton leaves
     max_fold_points : by arc length on the way round folds, after which the sweep looks from rest
