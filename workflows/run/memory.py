@@ -6,7 +6,7 @@ from pathlib import Path
 
 from tribodyn.refusal import Refusal
 
-FACTOR = 15e3  # bytes of a factor for each DOF, as measured in docs/validation/large.md
+FACTOR = 15e3  # bytes of a factor for each DOF, as measured in docs/developers/performance.md
 
 
 def forget_peak() -> None:
