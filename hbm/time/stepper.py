@@ -17,7 +17,7 @@ from tribodyn.hbm.balance import HarmonicBalance, State
 from tribodyn.hbm.contact import compiled_law
 from tribodyn.hbm.contact.contact_law import STICKS
 from tribodyn.hbm.harmonics import HarmonicBasis
-from tribodyn.hbm.time import coupled_pairs, rigid_contact, time_step
+from tribodyn.hbm.time import compile_ahead, coupled_pairs, rigid_contact, time_step
 from tribodyn.hbm.time.hold import Hold
 from tribodyn.hbm.time.time_step import Moving, Record
 from tribodyn.refusal import Refusal, SolverFailure
@@ -145,6 +145,7 @@ class TimeStepper:
         packed, gap, components = joint.parameters.packed(), joint.parameters.gap, joint.parameters.components
         normal = components.index("n") if "n" in components else -1
         self.law = compiled_law.pointer(joint.module.step)
+        compile_ahead.wait()
         forgets = normal >= 0 and time_step.forgets(self.law, packed, gap, normal, balance.memory)
         self.contact = coupled_pairs.Contact(packed, gap, normal, A, forgets, options.contact)
         self._space = coupled_pairs.Space.of(self.n_pair, self.c, balance.memory.shape[1])

@@ -6,6 +6,7 @@ before the documentation and the tests."""
 from typing import Any
 
 import tribodyn as td
+from tribodyn.hbm.time import compile_ahead
 
 SMALL: dict[str, Any] = {
     "geometry.n_patch": 3, "geometry.n_length": 3, "geometry.n_height": 1, "reduction.modes": 4,
@@ -20,6 +21,7 @@ def small_run(**more: Any) -> td.Result:
 
 
 if __name__ == "__main__":
+    compile_ahead.start()
     td.verify(small_run(), at=700.0)  # transitions located, and time integration
     small_run(**{"harmonics.transitions": "sampled"})
     model = td.build("beam", SMALL)

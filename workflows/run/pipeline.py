@@ -21,6 +21,7 @@ from tribodyn.hbm.continuation.harmonic_choice import HarmonicChoice
 from tribodyn.hbm.outcome import BranchEnd
 from tribodyn.hbm.stability.branch_stability import stability_along
 from tribodyn.hbm.threads import limited, usable
+from tribodyn.hbm.time import compile_ahead
 from tribodyn.output_file import set_aside
 from tribodyn.reduction.model import ReductionBasis
 from tribodyn.refusal import SolveFailed
@@ -57,6 +58,8 @@ def run(
     Raises  ValueError: the scene asks for what cannot be, SolveFailed: after what was computed is kept"""
     scene, clock = file.scene, Clock(earlier)
     settings.check_names(scene)
+    if scene.verdict.enabled and not row_only:
+        compile_ahead.start()
     keep = Keeper(None if folder is None else folder / "result.h5", clock)
     with alone_in(folder), limited(scene.solver.threads):
         model = modelling.build(file, progress, () if earlier is None else earlier.harmonics)
