@@ -178,7 +178,8 @@ def temperature_at(path: Path, points: np.ndarray) -> np.ndarray:
     Raises  Refusal for a file that is no such table"""
     try:
         lines = text_of(path).splitlines()
-        table = np.loadtxt(lines[_header(lines) :], delimiter=",", comments="#", ndmin=2)
+        has_names = numbers_of(lines[0].split(",")) is None
+        table = np.loadtxt(lines[has_names:], delimiter=",", comments="#", ndmin=2)
     except (OSError, ValueError) as trouble:
         raise Refusal(f"the field '{path}' cannot be read ({trouble}): give lines x, y, z, value") from None
     if table.shape[1] != 4 or not np.isfinite(table).all():
@@ -188,8 +189,3 @@ def temperature_at(path: Path, points: np.ndarray) -> np.ndarray:
         return np.asarray(nearest)
     inside = scipy.interpolate.LinearNDInterpolator(table[:, :3], table[:, 3])(points)
     return np.where(np.isnan(inside), nearest, inside)
-
-
-def _header(lines: list[str]) -> int:
-    """Lines before the first that is numbers: 1 for a line of names, else 0."""
-    return int(numbers_of(lines[0].split(",")) is None)

@@ -49,7 +49,8 @@ def build(parameters: Parameters, path: str | Path) -> None:
     """Write the mesh. Groups: volume "bolt"; surfaces "under_head", "thread" where the nut holds, "head", "end"."""
     p = parameters
     radius, across = p.diameter / 2, p.n_around // 4
-    square, shank, seat = rings.diamond(p.core * radius), rings.circle(radius), rings.circle(p.seat_diameter / 2)
+    square = rings.polygon(p.core * radius * np.array([[1.0, 0.0], [0.0, 1.0], [-1.0, 0.0], [0.0, -1.0]]))
+    shank, seat = rings.circle(radius), rings.circle(p.seat_diameter / 2)
     parts = []
     stations = [
         (-p.length, -p.grip - p.nut_height, p.n_end, {"w-": "end"}, None),

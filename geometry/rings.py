@@ -77,8 +77,3 @@ def core(half: float, across: int, z: np.ndarray, volume: str, sides: Mapping[st
 
     side = np.linspace(0, 1, across + 1)
     return Block(side, side, z, volume, sides or {}, mapped)
-
-
-def diamond(half: float) -> Curve:
-    """The rim of `core`."""
-    return polygon(half * np.array([[1.0, 0.0], [0.0, 1.0], [-1.0, 0.0], [0.0, -1.0]]))

@@ -6,7 +6,7 @@ Rows of the contact and outputs "<name>@<sector>" are those of the whole wheel, 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import NoReturn, cast
+from typing import ClassVar, NoReturn, cast
 
 import numpy as np
 
@@ -27,15 +27,8 @@ Change = Callable[[Joint, np.ndarray], Joint]
 class MistunedModel(ReducedModel):
     """All sectors of a wheel whose blades differ: no harmonic has a system of its own."""
 
-    @property
-    def has_one_system(self) -> bool:
-        """No."""
-        return False
-
-    @property
-    def has_motion_in_time(self) -> bool:
-        """No."""
-        return False
+    has_one_system: ClassVar[bool] = False
+    has_motion_in_time: ClassVar[bool] = False
 
     def at_harmonic(self, h: int) -> NoReturn:
         """Raise Refusal."""

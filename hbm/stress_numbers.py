@@ -18,18 +18,13 @@ def place_quantity(title: str, unit: str, number: PlaceNumber, rank: int, headli
     return CycleQuantity(
         title, unit, partial(largest, number=number), by_place=True, error=ErrorKind.CYCLE, rank=rank,
         headline=headline, slopes=partial(slopes_of_largest, number=number),
-        where=partial(place_of_largest, number=number),
+        where=lambda cycle: max(_values(cycle, number), key=lambda pair: pair[0])[1].name,
     )  # fmt: skip
 
 
 def largest(cycle: SolvedCycle, number: PlaceNumber) -> float | None:
     """The largest number of all places that the cycle is asked of; None without."""
     return max((value for value, _ in _values(cycle, number)), default=None)
-
-
-def place_of_largest(cycle: SolvedCycle, number: PlaceNumber) -> str:
-    """Name of the place with the largest number."""
-    return max(_values(cycle, number), key=lambda pair: pair[0])[1].name
 
 
 def slopes_of_largest(cycle: SolvedCycle, number: PlaceNumber, step: float = 1e-6) -> Slopes:

@@ -13,7 +13,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from typing import Self
+from typing import ClassVar, Self
 
 import numpy as np
 
@@ -105,35 +105,25 @@ class ReducedModel:
         """DOFs of the full system."""
         return self.origin.n_full(self.system.n_dof)
 
-    @property
-    def has_one_system(self) -> bool:
-        """Whether all harmonics see the same system."""
-        return True
+    has_one_system: ClassVar[bool] = True
+    """Whether all harmonics see the same system."""
 
-    @property
-    def has_motion_in_time(self) -> bool:
-        """Whether `system` is the equation of motion in time."""
-        return True
+    has_motion_in_time: ClassVar[bool] = True
+    """Whether `system` is the equation of motion in time."""
 
-    @property
-    def is_wave(self) -> bool:
-        """Whether it is one sector of a wheel under a travelling wave."""
-        return False
+    is_wave: ClassVar[bool] = False
+    """Whether it is one sector of a wheel under a travelling wave."""
 
     @property
     def sectors_in_time(self) -> int:
         """Copies that make the motion in time: those of a wave until it repeats itself, otherwise 1."""
         return 1
 
-    @property
-    def follows_frequency(self) -> bool:
-        """Whether its matrices depend on the excitation frequency; see `at_frequency`."""
-        return False
+    follows_frequency: ClassVar[bool] = False
+    """Whether its matrices depend on the excitation frequency; see `at_frequency`."""
 
-    @property
-    def leaves_flexibility_out(self) -> bool:
-        """Whether the coordinates leave out a part of the contact flexibility."""
-        return False
+    leaves_flexibility_out: ClassVar[bool] = False
+    """Whether the coordinates leave out a part of the contact flexibility."""
 
     def at_harmonic(self, h: int) -> tuple[SecondOrderSystem, np.ndarray]:
         """System and contact map (n_pair * n_component, n) that harmonic h sees."""

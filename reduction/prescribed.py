@@ -11,7 +11,7 @@ so that every system stays symmetric and a height is an amplitude like a force i
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
-from typing import Self
+from typing import ClassVar, Self
 
 import numpy as np
 import scipy.linalg as sla
@@ -62,10 +62,7 @@ class PrescribedModel(ReducedModel):
     static: SecondOrderSystem = field(kw_only=True)
     reaction: StaticReaction = field(kw_only=True)
 
-    @property
-    def has_one_system(self) -> bool:
-        """No: harmonic 0 sees another one."""
-        return False
+    has_one_system: ClassVar[bool] = False
 
     def at_harmonic(self, h: int) -> tuple[SecondOrderSystem, np.ndarray]:
         """System and contact map (n_pair * n_component, n) that harmonic h sees."""

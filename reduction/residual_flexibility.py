@@ -21,7 +21,7 @@ Source  residual flexibility of free-interface modes: MacNeal 1971, doi 10.1016/
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 from scipy.sparse import csc_matrix, csr_matrix
@@ -148,10 +148,7 @@ class FlexibleModel(ReducedModel):
 
     residual: ResidualFlexibility = field(kw_only=True)
 
-    @property
-    def leaves_flexibility_out(self) -> bool:
-        """Yes."""
-        return True
+    leaves_flexibility_out: ClassVar[bool] = True
 
     def matches(self, other: ReducedModel, harmonics: Sequence[int]) -> bool:
         """Whether another model has equal matrices and the same residual flexibility."""

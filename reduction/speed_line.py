@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
-from typing import Any, Self
+from typing import Any, ClassVar, Self
 
 import numpy as np
 import scipy.linalg as sla
@@ -164,10 +164,7 @@ class SpeedLineModel(WaveModel):
     line: SpeedLine = field(kw_only=True)
     line_error: float = field(kw_only=True)
 
-    @property
-    def follows_frequency(self) -> bool:
-        """Yes: the speed belongs to the frequency."""
-        return True
+    follows_frequency: ClassVar[bool] = True
 
     def at_frequency(self, omega: float) -> WaveModel:
         """The model at the speed that belongs to an excitation frequency [rad/s]."""

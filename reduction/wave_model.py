@@ -3,7 +3,7 @@
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from math import gcd
-from typing import Self
+from typing import ClassVar, Self
 
 import numpy as np
 
@@ -39,20 +39,9 @@ class WaveModel(ReducedModel):
         """Sectors of the wheel."""
         return self.reduced.sector.n_sectors
 
-    @property
-    def has_one_system(self) -> bool:
-        """No: each harmonic sees another index."""
-        return False
-
-    @property
-    def has_motion_in_time(self) -> bool:
-        """No: a sector alone has no equation of motion in time."""
-        return False
-
-    @property
-    def is_wave(self) -> bool:
-        """Yes."""
-        return True
+    has_one_system: ClassVar[bool] = False
+    has_motion_in_time: ClassVar[bool] = False
+    is_wave: ClassVar[bool] = True
 
     @property
     def sectors_in_time(self) -> int:

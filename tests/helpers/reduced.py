@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from typing import ClassVar
 
 import numpy as np
 
@@ -23,13 +24,8 @@ class HarmonicModel(ReducedModel):
 
     system_of: Callable[[int], tuple[SecondOrderSystem, np.ndarray]] = field(kw_only=True)
 
-    @property
-    def has_one_system(self) -> bool:
-        return False
-
-    @property
-    def has_motion_in_time(self) -> bool:
-        return False
+    has_one_system: ClassVar[bool] = False
+    has_motion_in_time: ClassVar[bool] = False
 
     def at_harmonic(self, h: int) -> tuple[SecondOrderSystem, np.ndarray]:
         return self.system_of(h)

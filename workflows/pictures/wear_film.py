@@ -1,6 +1,6 @@
 """Film of a contact over its wear."""
 
-from typing import Any
+from typing import Any, ClassVar
 
 import matplotlib as mpl
 import numpy as np
@@ -65,10 +65,8 @@ class WearFilm:
         """Number of images."""
         return len(self.states)
 
-    @property
-    def name(self) -> str:
-        """Name of the film's files."""
-        return "wear"
+    name: ClassVar[str] = "wear"
+    """Of the film's files."""
 
     def show(self, number: int) -> None:
         """Put a state into the figure."""

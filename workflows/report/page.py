@@ -48,7 +48,10 @@ def page(results: Sequence[tuple[str, Result, Path | None]]) -> str:
         if data["solids"][number] is not None:
             parts.append(_section(f"{prefix}worn part", _viewer(number), f"part-{number}"))
         if number == 0:
-            holders = "".join(map(_chart_holder, data["charts"]))
+            holders = "".join(
+                f'<figure><figcaption>{title}</figcaption><div class="chart" data-chart="{title}"></div></figure>'
+                for title in map(escape, data["charts"])
+            )
             parts.append(_section("Curves", '<div class="grid">' + holders + "</div>", "curves"))
         parts.append(_section(f"{prefix}method and assumptions", _method(result), f"method-{number}"))
         parts.append(_section(f"{prefix}inspection of the part and model", _inspection(result), f"inspection-{number}"))
@@ -88,11 +91,6 @@ def write(results: Sequence[tuple[str, Result, Path | None]], path: Path) -> Pat
     if size > LARGEST:
         raise Refusal(f"the report would have {size / 1e6:.0f} MB: report fewer results at once")
     return write_text(path, html)
-
-
-def _chart_holder(title: str) -> str:
-    name = escape(title)
-    return f'<figure><figcaption>{name}</figcaption><div class="chart" data-chart="{name}"></div></figure>'
 
 
 def _section(title: str, body: str, name: str) -> str:

@@ -86,7 +86,7 @@ def _cycle_lines(result: Result, answers: Sequence[Answer]) -> list[str]:
         if (
             not cycle_answers
             or (moment == LAST and not result.wear_steps)
-            or (moment == STABLE and not _is_unstable(result))
+            or (moment == STABLE and result.summary()["peak_is_stable"] is not False)
         ):
             continue
         frequency, *following = cycle_answers
@@ -98,10 +98,6 @@ def _cycle_lines(result: Result, answers: Sequence[Answer]) -> list[str]:
             values.insert(1, f"{60 * frequency.value / order:.{frequency.quantity.digits}g} rpm")
         lines.append(f"{word:{WIDTH}}{', '.join(values)}{suffix.get(moment, '')}")
     return lines
-
-
-def _is_unstable(result: Result) -> bool:
-    return result.summary()["peak_is_stable"] is False
 
 
 def _curve_lines(result: Result, answers: Sequence[Answer]) -> list[str]:

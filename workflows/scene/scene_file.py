@@ -288,15 +288,10 @@ def override_texts(overrides: Overrides) -> tuple[str, ...]:
         raise Refusal(f'overrides is "{overrides}": give a list of texts "section.key=value" or a dict')
     if not isinstance(overrides, Mapping):
         return tuple(overrides)
-    return tuple(
-        f"{key}=" if value is None else f"{key}={_on_one_line(tomli_w.dumps({'v': _plain(value)}).partition('=')[2])}"
-        for key, value in overrides.items()
-    )
-
-
-def _on_one_line(toml: str) -> str:
-    """An array over several lines as one: results keep a change in each line."""
-    return " ".join(line.strip() for line in toml.strip().splitlines())
+    texts = {
+        key: "" if v is None else tomli_w.dumps({"v": _plain(v)}).partition("=")[2] for key, v in overrides.items()
+    }
+    return tuple(f"{key}={' '.join(line.strip() for line in text.strip().splitlines())}" for key, text in texts.items())
 
 
 def _plain(value: Any) -> Any:
