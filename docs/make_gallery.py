@@ -177,17 +177,16 @@ def small(path: Path, name: str) -> Path:
 def write_page() -> None:
     """The page of all pictures that are there, scene by scene."""
     lines = [
-        "# Every picture of every scene", "",
-        "The scenes that come with tribodyn, as they are shipped, in every kind of picture that it draws.",
-        "One command made them all, and this page:", "", "```text", "./tribodyn gallery", "```", "",
-        "Each is drawn by `tribodyn run`, `draw` or `wheel`.", "",
+        "# Pictures of every scene", "",
+        "`tribodyn run`, `draw` and `wheel` draw these pictures; `./tribodyn gallery` made them and this page.", "",
+        "| picture | shows |", "|---|---|", *(f"| `{kind}` | {caption} |" for kind, caption in KINDS.items()), "",
     ]  # fmt: skip
     for name in td.scene_names():
         pictures = [
             line
-            for kind, caption in KINDS.items()
+            for kind in KINDS
             for path in sorted(PICTURES.glob(f"{name}_{kind}.*"))
-            for line in (f"![{name}: {caption}](pictures/{path.name})", "", caption, "")
+            for line in (f"![`{path.stem.removeprefix(f'{name}_')}`](pictures/{path.name})", "")
         ]
         lines += [f"## {name.replace('_', ' ')}", "", *pictures] if pictures else []
     PAGE.write_text("\n".join(lines).rstrip() + "\n", encoding="utf-8")
