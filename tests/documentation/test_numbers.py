@@ -3,10 +3,7 @@
 import pkgutil
 import re
 
-from tests.helpers.pages import ROOT
 from tribodyn import hbm
-
-PAGE = (ROOT / "docs/developers/measured.md").read_text(encoding="utf-8")
 
 
 def test_the_map_of_the_solver_names_every_module() -> None:
