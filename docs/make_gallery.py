@@ -20,7 +20,7 @@ from tempfile import TemporaryDirectory
 from PIL import Image
 
 import tribodyn as td
-from tribodyn.workflows.pictures import response_plots
+from tribodyn.workflows.pictures import film as films, response_plots
 from tribodyn.workflows.studies import front_door
 
 FOLDER = Path(__file__).parent
@@ -99,9 +99,10 @@ def of_scene(name: str, folder: Path) -> Iterator[Path]:
         for over in ("wear", "cycle"):
             if over == "cycle" or result.wear_steps:
                 spent = time.process_time()
-                (film,) = front_door.animate(
-                    result, Path(place), over, formats=("gif",), images=FILM_IMAGES, dpi=FILM_DPI,
+                (film,) = films.film(
+                    result, place, over, formats=("gif",), images=FILM_IMAGES, dpi=FILM_DPI,
                     row=0 if over == "cycle" and result.wear_steps else None,
+                    deformation=result.scene.pictures.deformation_scale, wear=result.scene.pictures.wear_scale,
                 )  # fmt: skip
                 print(f"  film over {over}: {(time.process_time() - spent) / FILM_IMAGES:.2f} s of processor an image")
                 yield Path(shutil.copy(film, PICTURES / f"{name}_film_{over}.gif"))

@@ -15,28 +15,16 @@ from pathlib import Path
 from typing import Any, TypeVar
 
 from tribodyn import declarations
-from tribodyn.hbm.quantity_sources import MotionInTime, Slopes, SolvedCurve, SolvedCycle, WornContact
+from tribodyn.hbm.quantity_sources import (
+    MotionInTime as MotionInTime,
+    Slopes as Slopes,
+    SolvedCurve as SolvedCurve,
+    SolvedCycle as SolvedCycle,
+    WornContact as WornContact,
+)
 from tribodyn.plugins import PluginKind
 from tribodyn.refusal import Refusal
 
-__all__ = [
-    "CurveQuantity",
-    "CycleQuantity",
-    "ErrorKind",
-    "MotionInTime",
-    "Slopes",
-    "SolvedCurve",
-    "SolvedCycle",
-    "StatedQuantity",
-    "WearQuantity",
-    "WornContact",
-    "load",
-    "names_with_error",
-    "of_wear_with_error",
-    "quantities_of",
-    "quantity_named",
-    "with_error",
-]  # fmt: skip
 FILES = PluginKind("quantity", "tribodyn.hbm.quantities", ())
 
 

@@ -5,12 +5,12 @@
 with R, `reduction.residual_flexibility`, applied by a sparse factor and never a matrix. There is no W_0 and there are
 no powers of s here: see `expansion`, whose interface this has."""
 
+from typing import Any
+
 import numpy as np
 import scipy.linalg as sla
 
 from tribodyn.fem.system import SecondOrderSystem
-from tribodyn.hbm.excitation import Excitation
-from tribodyn.hbm.harmonics import HarmonicBasis
 from tribodyn.hbm.linear import all_harmonics
 from tribodyn.hbm.linear.compliance import ContactCompliance
 from tribodyn.hbm.linear.compliance_point import CompliancePoint
@@ -64,17 +64,9 @@ class RitzExpansion(Expansion):
 class FlexibleCompliance(ContactCompliance):
     """Contact compliance of a model with residual flexibility; stiffness must be that of `model.residual`."""
 
-    def __init__(
-        self,
-        model: FlexibleModel,
-        stiffness: np.ndarray,
-        basis: HarmonicBasis,
-        excitation: Excitation,
-        omega_max: float,
-        target_error: float | None = None,
-    ):
+    def __init__(self, model: FlexibleModel, *settings: Any):
         self.residual = model.residual
-        super().__init__(model, stiffness, basis, excitation, omega_max, target_error)
+        super().__init__(model, *settings)
 
     def _expansion(self, system: SecondOrderSystem, b: np.ndarray, ports: np.ndarray, s_max: float) -> Expansion:
         return RitzExpansion(system, b, self.k, ports, s_max, self.residual)

@@ -169,9 +169,13 @@ def draw(
     loaded, folder = store.load(result), out or store.result_file(result).parent / "pictures"
     if not film:
         _draw(loaded, folder, formats or ("png",), dpi or 200)
+    settings = loaded.scene.pictures
     for over in film:
-        choices = {"row": row, "formats": formats or ("mp4",), "images": images, "dpi": dpi or 100}
-        print(*front_door.animate(loaded, folder, over, **choices), sep="\n")  # type: ignore[arg-type]
+        from tribodyn.workflows.pictures import film as films
+
+        factors = settings.deformation_scale, settings.wear_scale
+        paths = films.film(loaded, folder, over, row, formats or ("mp4",), images, dpi or 100, *factors)
+        print(*paths, sep="\n")
 
 
 def _draw(

@@ -17,14 +17,7 @@ from tribodyn.hbm.continuation.resonance_peak import AtPeak
 from tribodyn.hbm.harmonics import HarmonicBasis
 from tribodyn.hbm.newton import Solution
 from tribodyn.hbm.outcome import CONVERGED
-from tribodyn.hbm.quantity import (
-    CycleQuantity,
-    ErrorKind,
-    SolvedCycle,
-    WornContact,
-    of_wear_with_error,
-    with_error,
-)
+from tribodyn.hbm.quantity import CycleQuantity, ErrorKind, SolvedCycle, WornContact, of_wear_with_error, with_error
 from tribodyn.hbm.wear.history import LIFE_SHARE
 from tribodyn.refusal import Refusal, SolveFailed, SolverFailure
 from tribodyn.workflows.errors.refinement_limits import RefinementLimits

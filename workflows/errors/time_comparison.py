@@ -6,14 +6,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from tribodyn.hbm.balance import HarmonicBalance
-from tribodyn.hbm.quantity import (
-    CycleQuantity,
-    ErrorKind,
-    MotionInTime,
-    SolvedCycle,
-    of_wear_with_error,
-    quantities_of,
-)
+from tribodyn.hbm.quantity import CycleQuantity, ErrorKind, MotionInTime, SolvedCycle, of_wear_with_error, quantities_of
 from tribodyn.hbm.time import time_integration
 from tribodyn.hbm.time.mean_motion import Follower, MeanMotion, MeanOptions
 from tribodyn.hbm.time.stepper import Options as TimeOptions

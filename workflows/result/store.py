@@ -235,7 +235,8 @@ def _result(file: h5py.File) -> Result:
         if name in file
     }
     provenance = {key: _text(value) for key, value in file["provenance"].attrs.items()}
-    scene, facts = scene_file.from_json(provenance.pop("scene")), _attributes(file["facts"].attrs)
+    scene = scene_file.from_json(provenance.pop("scene"))
+    facts = {key: v.item() if isinstance(v, np.generic) else v for key, v in file["facts"].attrs.items()}
     joints = {name: slice(*ends) for name, ends in json.loads(facts.get("joints", "{}")).items()}
     verdict = _text(file.attrs["verdict"])
     result = Result(
@@ -324,7 +325,3 @@ def _text(value: Any) -> str:
 def _outcome(ends: type[Ended], name: str, sentence: str) -> Outcome[Ended]:
     end = ends[name]
     return end.say(sentence.removeprefix(end.value))
-
-
-def _attributes(attributes: h5py.AttributeManager) -> dict[str, Any]:
-    return {key: value.item() if isinstance(value, np.generic) else value for key, value in attributes.items()}

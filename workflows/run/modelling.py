@@ -13,11 +13,7 @@ import numpy as np
 
 from tribodyn.fem import part as fem_part
 from tribodyn.fem.constraints import NoMeanRotation
-from tribodyn.fem.load_vectors import (
-    Load,
-    NodalForce,
-    Sum,
-)
+from tribodyn.fem.load_vectors import Load, NodalForce, Sum
 from tribodyn.fem.part import Part, unbalanced_load
 from tribodyn.hbm.balance import HarmonicBalance
 from tribodyn.hbm.contact.joint import Joint, joint_transitions

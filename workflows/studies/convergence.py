@@ -17,13 +17,7 @@ from matplotlib.ticker import NullFormatter
 
 from tribodyn.hbm.quantity import names_with_error, quantity_named
 from tribodyn.refusal import Refusal
-from tribodyn.workflows.errors.ladder_table import (
-    SOLVED,
-    LadderRow,
-    LadderTable,
-    LadderTables,
-    measure_ladders,
-)
+from tribodyn.workflows.errors.ladder_table import SOLVED, LadderRow, LadderTable, LadderTables, measure_ladders
 from tribodyn.workflows.errors.ladders import SPRINGS
 from tribodyn.workflows.pictures.theme import GREY, STYLE
 from tribodyn.workflows.result.summary import plain

@@ -3,7 +3,6 @@
 from collections.abc import Sequence
 from os import PathLike
 from pathlib import Path
-from typing import Literal
 
 from tribodyn.consent import asks_consent
 from tribodyn.output_file import set_aside
@@ -136,26 +135,6 @@ def draw(
         except offscreen.RenderingUnavailable as reason:
             missing = f"no renders: {reason}"
     return written, missing
-
-
-def animate(
-    result: Result,
-    folder: Path,
-    over: Literal["wear", "cycle"],
-    *,
-    row: int | None = None,
-    formats: Sequence[str] = ("mp4",),
-    images: int = 48,
-    dpi: int = 100,
-) -> list[Path]:
-    """Make a film of a result with the factors of exaggeration of its scene, see pictures.film; returns its files.
-
-    Raises  Refusal: the result has nothing of the kind to show; RenderingUnavailable"""
-    from tribodyn.workflows.pictures.film import film
-
-    settings = result.scene.pictures
-    factors = settings.deformation_scale, settings.wear_scale
-    return film(result, folder, over, row, formats, images, dpi, *factors)
 
 
 @asks_consent
