@@ -7,9 +7,8 @@ from typing import Any
 
 import numpy as np
 from scipy.sparse import bsr_matrix, csr_matrix
-from skfem import MeshHex1, MeshTet2
-from skfem.quadrature import get_quadrature
 
+from tribodyn.geometry.element_library import skfem
 from tribodyn.refusal import Refusal
 
 
@@ -22,7 +21,7 @@ def connectivity(mesh: Any) -> np.ndarray:
     """Nodes of the elements (n_element, 27, 10 or 8), in scikit-fem's local order.
 
     Raises  Refusal where the mesh is not of 27-node or 8-node hexahedra or 10-node tetrahedra"""
-    if not isinstance(mesh, MeshHex1 | MeshTet2):  # MeshHex2 is a MeshHex1
+    if not isinstance(mesh, skfem.MeshHex1 | skfem.MeshTet2):  # MeshHex2 is a MeshHex1
         raise Refusal(
             f"the mesh is a {type(mesh).__name__}, but elasticity needs hexahedra or second-order tetrahedra "
             "(MeshTet2); raise the element order of the geometry"
@@ -51,7 +50,7 @@ def mapped_batches(
     Raises  Refusal where an element is folded"""
     nodes, points = connectivity(mesh), coordinates(mesh)
     element = mesh.elem()
-    X, w = get_quadrature(element, order)
+    X, w = skfem.quadrature.get_quadrature(element, order)
     values, slopes = zip(*(element.lbasis(X, a) for a in range(nodes.shape[1])), strict=True)
     N = np.stack(np.broadcast_arrays(*values)).T
     dN = np.stack([np.stack(np.broadcast_arrays(*s)) for s in slopes]).transpose(2, 1, 0)  # n_q, 3 local, n_a

@@ -13,13 +13,12 @@ from typing import Any
 
 import numpy as np
 import scipy
-from skfem import ElementTriP1, MeshHex1
-from skfem.quadrature import get_quadrature
 
 from tribodyn.fem.assembly import piece_of_facets
 from tribodyn.fem.elements import coordinates
 from tribodyn.fem.facet_cuts import clip_polygons, locate_on_facets, polygon_areas, reference_corners, tangent_planes
 from tribodyn.fem.surface import facet_nodes, require_outside, tabulate
+from tribodyn.geometry.element_library import skfem
 
 
 @dataclass(frozen=True)
@@ -104,7 +103,7 @@ def side(mesh: Any, facets: np.ndarray, rotation: np.ndarray | None = None) -> S
     )
     if rotation is not None:
         points, inner = points @ rotation.T, inner @ rotation.T
-    n = 4 if isinstance(piece.mesh, MeshHex1) else 3
+    n = 4 if isinstance(piece.mesh, skfem.MeshHex1) else 3
     centre = points[:, :n].mean(axis=1)
     middle = np.tile(np.full((2, 1), 0.5 if n == 4 else 1 / 3), len(nodes))
     _, slopes = tabulate(points.shape[1], middle)
@@ -174,7 +173,7 @@ def shared_surface(first_side: Side, second_side: Side, reach: float) -> SharedS
         np.abs(facet_area[is_cut]),
     )
 
-    X, w = get_quadrature(ElementTriP1, MORTAR.curved_order if curved else MORTAR.flat_order)
+    X, w = skfem.quadrature.get_quadrature(skfem.ElementTriP1, MORTAR.curved_order if curved else MORTAR.flat_order)
     hub = polygon.mean(axis=1, keepdims=True)
     a, b = polygon - hub, np.roll(polygon, -1, axis=1) - hub
     twice = a[..., 0] * b[..., 1] - a[..., 1] * b[..., 0]

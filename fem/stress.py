@@ -14,11 +14,11 @@ from typing import Any
 import numpy as np
 import scipy
 from scipy.sparse import csr_matrix
-from skfem.quadrature import get_quadrature
 
 from tribodyn.fem.assembly import Materials, Piece, materials_of, pieces
 from tribodyn.fem.elasticity import element_materials, element_tensors, formulation, strain_operators, strain_points
 from tribodyn.fem.elements import connectivity, coordinates
+from tribodyn.geometry.element_library import skfem
 from tribodyn.refusal import Refusal
 
 COMPONENTS = ("xx", "yy", "zz", "yz", "xz", "xy")
@@ -100,7 +100,7 @@ def _recovery_points(mesh: Any, material: Materials, elements: np.ndarray) -> It
     reference = np.asarray(mesh.elem().doflocs).reshape(-1, 3)
     is_tetrahedron = len(reference) == 10
     order = 2 if is_tetrahedron else 3
-    X, _ = get_quadrature(mesh.elem(), order)
+    X, _ = skfem.quadrature.get_quadrature(mesh.elem(), order)
     extrapolation = _monomials(reference, is_tetrahedron) @ np.linalg.inv(_monomials(X.T, is_tetrahedron))
     nodes = connectivity(mesh)
     for numbers, N, gradient, _, enhancement in strain_operators(mesh, material, order, 1024, elements):

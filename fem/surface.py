@@ -5,11 +5,10 @@ from itertools import pairwise
 from typing import Any
 
 import numpy as np
-from skfem import ElementQuad1, ElementQuad2, ElementTriP1, ElementTriP2, MeshHex1
-from skfem.quadrature import get_quadrature
 
 from tribodyn.fem.assembly import piece_of_facets
 from tribodyn.fem.elements import connectivity, coordinates
+from tribodyn.geometry.element_library import skfem
 from tribodyn.refusal import Refusal
 
 # The four quads that a nine-node face shows, in its own node order: corners, mid-sides, middle.
@@ -138,8 +137,9 @@ def face_integrals(mesh: Any, facets: np.ndarray, vertices_only: bool = False) -
     Returns (n_facet, k) [m2] and (n_facet, k, 3) [m2]; k nodes of the facet, or its vertices"""
     piece, facets = piece_of_facets(mesh, facets)
     mesh, nodes, points = piece.mesh, _facet_nodes(piece.mesh, facets), coordinates(piece.mesh)
-    k, corners = nodes.shape[1], 4 if isinstance(mesh, MeshHex1) else 3
-    X, w = get_quadrature(ELEMENTS[k], 6)  # exact for a shape function times the normal of a flat face
+    k, corners = nodes.shape[1], 4 if isinstance(mesh, skfem.MeshHex1) else 3
+    element = getattr(skfem, ELEMENTS[k])
+    X, w = skfem.quadrature.get_quadrature(element, 6)  # exact for a shape function times the normal of a flat face
     N, slopes = tabulate(k, X)  # n_a, n_q and n_a, 2, n_q
     tangents = np.einsum("aiq,fax->fiqx", slopes, points[nodes])
     normal = np.cross(tangents[:, 0], tangents[:, 1])  # |normal| is the area element
@@ -152,12 +152,12 @@ def face_integrals(mesh: Any, facets: np.ndarray, vertices_only: bool = False) -
     return np.einsum("aq,fq,q->fa", N, np.linalg.norm(normal, axis=2), w), vectors
 
 
-ELEMENTS: dict[int, Any] = {9: ElementQuad2, 6: ElementTriP2, 4: ElementQuad1, 3: ElementTriP1}
+ELEMENTS = {9: "ElementQuad2", 6: "ElementTriP2", 4: "ElementQuad1", 3: "ElementTriP1"}  # of scikit-fem, by nodes
 
 
 def tabulate(k: int, xi: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Shape functions (k, n) and slopes (k, 2, n) of a facet of k nodes (9, 6, 4 or 3) at xi (2, n)."""
-    element = ELEMENTS[k]()
+    element = getattr(skfem, ELEMENTS[k])()
     values = [element.lbasis(xi, a) for a in range(k)]
     slopes = [np.stack(np.broadcast_arrays(*slope, xi[0])[:2]) for _, slope in values]
     return np.stack([np.broadcast_to(value, xi.shape[1:]) for value, _ in values]), np.stack(slopes)

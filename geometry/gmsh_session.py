@@ -6,6 +6,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
+from tribodyn.extras import package
 from tribodyn.refusal import Refusal
 
 SYSTEM_LIBRARIES = "libglu1-mesa libgl1 libxcursor1 libxft2 libxinerama1 libgomp1"
@@ -22,8 +23,8 @@ def session() -> Iterator[Any]:
     Yields the gmsh module, with an empty model
     Raises GmshUnavailable: the package or one of its system libraries is missing"""
     try:
-        import gmsh
-    except (ImportError, OSError) as error:  # its shared library is opened with ctypes: OSError
+        gmsh = package("gmsh")
+    except OSError as error:  # its shared library is opened with ctypes
         raise GmshUnavailable(
             f"gmsh cannot be loaded ({error}): install its system libraries with "
             f"'apt-get install --no-install-recommends {SYSTEM_LIBRARIES}', or start tribodyn through ./tribodyn."

@@ -5,8 +5,8 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from skfem.quadrature import get_quadrature
 
+from tribodyn.geometry.element_library import skfem
 from tribodyn.geometry.sources import foreign_file as sources, solid_body
 from tribodyn.geometry.sources.cad import Sizes
 from tribodyn.geometry.sources.deck import Deck
@@ -65,7 +65,7 @@ def quality(mesh: Any) -> Quality:
     mesh : skfem MeshHex2 or MeshTet2
     Raises Refusal: an element is inverted or degenerate somewhere
     Source  scaled Jacobian: Knupp, 2000; for tetrahedra normalised to 1 for the regular one"""
-    points, weights = get_quadrature(mesh.elem.refdom, 5)
+    points, weights = skfem.quadrature.get_quadrature(mesh.elem.refdom, 5)
     at = np.hstack([mesh.elem.doflocs.T, points])
     jacobian = np.moveaxis(mesh.mapping().DF(at), (0, 1), (-2, -1))  # (element, point, 3, 3)
     determinant = np.linalg.det(jacobian)
@@ -113,7 +113,7 @@ def facts(mesh: Any, density: np.ndarray | None = None) -> MeshFacts:
 
     Raises  Refusal: an element is inverted or degenerate"""
     worst_quality = quality(mesh)
-    X, w = get_quadrature(mesh.elem.refdom, 5)
+    X, w = skfem.quadrature.get_quadrature(mesh.elem.refdom, 5)
     mapping = mesh.mapping()
     weight = np.abs(mapping.detDF(X)) * w
     x = mapping.F(X)
@@ -129,5 +129,5 @@ def facts(mesh: Any, density: np.ndarray | None = None) -> MeshFacts:
 
 def area(mesh: Any, facets: np.ndarray) -> float:
     """Area of some facets [m2]."""
-    X, w = get_quadrature(mesh.brefdom, 4)
+    X, w = skfem.quadrature.get_quadrature(mesh.brefdom, 4)
     return float((np.abs(mesh.mapping().detDG(X, find=np.asarray(facets))) @ w).sum()) if len(facets) else 0.0

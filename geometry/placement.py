@@ -5,8 +5,8 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
-import skfem
 
+from tribodyn.geometry.element_library import skfem
 from tribodyn.refusal import Refusal
 
 MAX_SAMPLES = 1000  # elements of a body that are looked at

@@ -9,8 +9,8 @@ from typing import Any
 
 import numpy as np
 from scipy.sparse import csr_matrix
-from skfem import ElementHex1, ElementTetP1, MeshHex, MeshHex2, MeshTet, MeshTet2
 
+from tribodyn.geometry.element_library import skfem
 from tribodyn.refusal import Refusal
 
 Groups = dict[str, np.ndarray]
@@ -31,22 +31,22 @@ def first_order(mesh: Any, node_sets: Mapping[str, np.ndarray], name: str) -> tu
     """A mesh of hexahedra with straight edges as one of 8-node ones (MeshHex1); a corner keeps its number.
 
     Raises  Refusal, which names the body, for tetrahedra or curved elements"""
-    if not isinstance(mesh, MeshHex2):
+    if not isinstance(mesh, skfem.MeshHex2):
         raise Refusal(f"linear elements need hexahedra, and body '{name}' has tetrahedra: elements = \"quadratic\"")
     n, points = mesh.nvertices, np.asarray(mesh.doflocs)
     middle = points[:, mesh.edges].mean(axis=1)
     off = np.abs(points[:, mesh.dofs.edge_dofs[0]] - middle).max(axis=0)
     if (off > 1e-6 * np.linalg.norm(np.ptp(points[:, mesh.edges], axis=1), axis=0)).any():
         raise Refusal(f"linear elements need straight edges, '{name}' has curved ones: elements = \"quadratic\"")
-    plain: Any = MeshHex(points[:, :n].copy(), mesh.t, sort_t=False)
+    plain: Any = skfem.MeshHex(points[:, :n].copy(), mesh.t, sort_t=False)
     plain = plain.with_boundaries(mesh.boundaries or {}).with_subdomains(mesh.subdomains or {})
     return plain, {key: np.asarray(of)[np.asarray(of) < n] for key, of in node_sets.items()}
 
 
 def _once(mesh: Any, node_sets: Mapping[str, np.ndarray]) -> tuple[Any, Groups]:
-    hexahedra = isinstance(mesh, MeshHex2)
+    hexahedra = isinstance(mesh, skfem.MeshHex2)
     n_vertex = int(mesh.t.max()) + 1
-    plain: Any = (MeshHex if hexahedra else MeshTet)(mesh.doflocs[:, :n_vertex], mesh.t, sort_t=False)
+    plain: Any = (skfem.MeshHex if hexahedra else skfem.MeshTet)(mesh.doflocs[:, :n_vertex], mesh.t, sort_t=False)
     cells = plain.refined().t  # its vertices are counted as the nodes of second order: edges, facets, middles
     nodes = np.asarray(mesh.dofs.element_dofs)
     parent = _containing(cells, nodes, mesh.doflocs.shape[1])
@@ -54,8 +54,8 @@ def _once(mesh: Any, node_sets: Mapping[str, np.ndarray]) -> tuple[Any, Groups]:
         at = mesh.elem.doflocs[(nodes[:, parent][None] == cells[:, None]).argmax(axis=1)]
         mirrored = np.linalg.det(np.moveaxis(at[1:] - at[0], 1, 0)) < 0
         cells[2:, mirrored] = cells[:1:-1, mirrored]
-    linear: Any = (MeshHex if hexahedra else MeshTet)(np.asarray(mesh.doflocs), cells, sort_t=False)
-    fine: Any = (MeshHex2 if hexahedra else MeshTet2).from_mesh(linear)
+    linear: Any = (skfem.MeshHex if hexahedra else skfem.MeshTet)(np.asarray(mesh.doflocs), cells, sort_t=False)
+    fine: Any = (skfem.MeshHex2 if hexahedra else skfem.MeshTet2).from_mesh(linear)
     points = _node_positions(mesh, nodes, fine, cells, parent)
     boundaries = {name: _pieces(mesh, fine, np.asarray(ids)) for name, ids in (mesh.boundaries or {}).items()}
     subdomains = {
@@ -84,7 +84,7 @@ def _containing(cells: np.ndarray, nodes: np.ndarray, n_node: int) -> np.ndarray
 def _node_positions(mesh: Any, nodes: np.ndarray, fine: Any, cells: np.ndarray, parent: np.ndarray) -> np.ndarray:
     """(3, n_node) nodes of the pieces, where the shape functions of their parents bring them."""
     element = mesh.elem()
-    linear: Any = ElementHex1() if isinstance(mesh, MeshHex2) else ElementTetP1()
+    linear: Any = skfem.ElementHex1() if isinstance(mesh, skfem.MeshHex2) else skfem.ElementTetP1()
     local = (nodes[:, parent][None] == cells[:, None]).argmax(axis=1)  # (corner, piece) local node of the parent
     kinds, kind = np.unique(local, axis=1, return_inverse=True)
     weights = np.stack([_values(linear, element.doflocs.T, a) for a in range(len(cells))])  # (corner, node)
@@ -106,7 +106,7 @@ def _values(element: Any, at: np.ndarray, i: int) -> np.ndarray:
 def _all_nodes(mesh: Any, facets: np.ndarray) -> np.ndarray:
     """(k, n_facet) nodes of facets: corners, mid-sides, middles."""
     parts = [mesh.facets[:, facets], mesh.dofs.edge_dofs[0][mesh.f2e[:, facets]]]
-    if isinstance(mesh, MeshHex2):
+    if isinstance(mesh, skfem.MeshHex2):
         parts.append(mesh.dofs.facet_dofs[:, facets])
     return np.vstack(parts)
 

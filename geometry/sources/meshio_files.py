@@ -7,14 +7,15 @@ from typing import Any
 
 import numpy as np
 
+from tribodyn.extras import package
 from tribodyn.geometry.sources.raw_mesh import SURFACES, VOLUMES
 from tribodyn.refusal import Refusal
 
 
 def content(path: str) -> dict[str, Any]:
     """The fields of the RawMesh of a file; meshio knows its format by the ending. Raises Refusal: it cannot be read."""
-    import meshio  # 85 modules, of which few scenes need one
-    from meshio._mesh import topological_dimension
+    meshio = package("meshio")  # 85 modules, of which few scenes need one
+    topological_dimension = package("meshio._mesh").topological_dimension
 
     topological_dimension.update({kind: 3 for kind in VOLUMES})  # meshio 5.3.5 forgets wedge15 and pyramid13
     try:

@@ -11,10 +11,10 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-import skfem
 from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components
 
+from tribodyn.geometry.element_library import skfem
 from tribodyn.geometry.numbering import REFERENCE_POINTS, permutation
 from tribodyn.geometry.sources.full_elements import Full, Pieces, cut_face, full, supports, tetrahedra, uncut
 from tribodyn.geometry.sources.raw_mesh import HEXA, TETRA, VOLUMES, Cells, RawMesh

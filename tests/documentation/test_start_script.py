@@ -19,7 +19,8 @@ def test_scripts_are_executable_and_parse(script):
 
 def test_a_python_that_is_too_old_is_refused_in_one_sentence(tmp_path):
     shutil.copy(ROOT / "tribodyn", tmp_path)
-    shutil.copy(ROOT / "pyproject.toml", tmp_path)
+    for name in ("pyproject.toml", "locked.txt"):
+        shutil.copy(ROOT / name, tmp_path)
     environment = {**os.environ, "TRIBODYN_PYTHON": "false"}
     done = subprocess.run([tmp_path / "tribodyn", "run"], env=environment, capture_output=True, text=True, check=False)
     assert done.returncode == 2
@@ -45,7 +46,7 @@ def test_environment_is_made_once_and_handed_over_to(tmp_path):
     """A stand-in for Python records what is asked of it: one installation, then none until pyproject.toml changes."""
     home = tmp_path / "a folder"
     home.mkdir()
-    for name in ("tribodyn", "pyproject.toml"):
+    for name in ("tribodyn", "pyproject.toml", "locked.txt"):
         shutil.copy(ROOT / name, home)
     for name, text in {"python": FAKE_PYTHON, "command": FAKE_COMMAND}.items():
         (tmp_path / name).write_text(text)
@@ -65,7 +66,7 @@ def test_environment_is_made_once_and_handed_over_to(tmp_path):
 
     first = start()
     assert f"-m venv {home}/.venv" in first
-    assert f"-m pip install --no-compile --editable {home}[all]\n" in first
+    assert f"-m pip install --no-compile --editable {home}[all] --constraint {home}/locked.txt\n" in first
     assert "import gmsh" in first
     assert "import pyvista" in first
     assert start() == "-c \n"  # it only makes sure that this Python still runs

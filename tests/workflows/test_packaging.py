@@ -6,6 +6,7 @@ import re
 import shutil
 import subprocess
 import sys
+import tarfile
 import tomllib
 import zipfile
 from pathlib import Path
@@ -24,31 +25,60 @@ SMALL = [
 ]  # fmt: skip
 
 
-@pytest.fixture(scope="module")
-def wheel(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A wheel made from a copy of the tree, as a clean clone has it."""
-    built = tmp_path_factory.mktemp("wheel")
-    tree = built / "tree"
+def clone(tree: Path) -> Path:
+    """A copy of the tree, as a clean clone has it."""
     tree.mkdir()
-    for name in ("pyproject.toml", "README.md", "LICENSE"):
+    for name in ("pyproject.toml", "setup.py", "MANIFEST.in", "CITATION.cff", "README.md", "LICENSE"):
         shutil.copy(ROOT / name, tree)
     for name in (*FOLDERS, "src"):
         hidden = shutil.ignore_patterns("__pycache__", "*.egg-info")
         shutil.copytree(ROOT / name, tree / name, symlinks=True, ignore=hidden)
-    words = ["-m", "pip", "wheel", str(tree), "--no-deps", "--no-build-isolation", "-q", "-w", str(built)]
+    return tree
+
+
+def wheel_of(source: Path) -> Path:
+    """The wheel that pip makes of a tree or of a source distribution."""
+    built = source.with_name(f"{source.name}-wheel")
+    words = ["-m", "pip", "wheel", str(source), "--no-deps", "--no-build-isolation", "-q", "-w", str(built)]
     subprocess.run([sys.executable, *words], check=True, capture_output=True)
     (result,) = built.glob("*.whl")
     return result
+
+
+@pytest.fixture(scope="module")
+def wheel(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return wheel_of(clone(tmp_path_factory.mktemp("wheel") / "tree"))
+
+
+def test_a_clone_without_links_and_a_source_distribution_make_the_same_wheel(wheel: Path, tmp_path: Path) -> None:
+    """Git leaves links as text files where core.symlinks is false."""
+    names = [zipfile.ZipFile(wheel).namelist()]
+    code = "import sys; from setuptools import build_meta; build_meta.build_sdist(sys.argv[1])"
+    tree = clone(tmp_path / "tree")
+    subprocess.run([sys.executable, "-c", code, str(tmp_path)], cwd=tree, check=True, capture_output=True)
+    (source,) = tmp_path.glob("*.tar.gz")
+    with tarfile.open(source) as archive:
+        assert not [member.name for member in archive if not (member.isfile() or member.isdir())]
+    windows = clone(tmp_path / "windows")
+    for name in FOLDERS:
+        link = windows / "src" / "tribodyn" / name
+        target = os.readlink(link)
+        link.unlink()
+        link.write_text(target)
+    names += [zipfile.ZipFile(wheel_of(place)).namelist() for place in (source, windows)]
+    assert sorted(names[1]) == sorted(names[0])
+    assert sorted(names[2]) == sorted(names[0])
 
 
 def test_recipe_container_and_citation_agree_with_the_project() -> None:
     project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
     recipe = yaml.safe_load((ROOT / "recipe/recipe.yaml").read_text(encoding="utf-8"))
     renamed = {"python-gmsh": "gmsh", "matplotlib-base": "matplotlib"}
+    extras = project["optional-dependencies"]
     run = [line.split(" ") for line in recipe["requirements"]["run"]]
     assert ["python", project["requires-python"]] in run
     assert sorted(renamed.get(name, name) + least for name, least in run if name != "python") == sorted(
-        project["dependencies"]
+        (*project["dependencies"], *extras["mesh"], *extras["pictures"])
     )
     assert recipe["build"]["python"]["entry_points"] == [f"tribodyn = {project['scripts']['tribodyn']}"]
     about = recipe["about"]

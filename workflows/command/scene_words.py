@@ -8,6 +8,7 @@ from typing import Annotated, Literal
 
 from cyclopts import Parameter
 
+from tribodyn.extras import MissingPackage
 from tribodyn.output_file import printable
 from tribodyn.refusal import Refusal, SolveFailed, SolverFailure
 from tribodyn.workflows.command.word import QUIET, Flag, Json, Overrides, make_room
@@ -78,8 +79,11 @@ def run(
     if not quiet:
         _print(result, verbose)
     if pictures:
-        _draw(result, folder / "pictures", report=progress.detail, complain=progress.say)
-        progress.say(f"pictures  {folder / 'pictures'}")
+        try:
+            _draw(result, folder / "pictures", report=progress.detail, complain=progress.say)
+            progress.say(f"pictures  {folder / 'pictures'}")
+        except MissingPackage as missing:
+            progress.say(f"no pictures: {missing}")
     progress.say(f"next      tribodyn report {folder} makes one page of it, tribodyn show {folder} --verbose says all")
     if bound is not None and not bound.is_satisfied:
         raise SolverFailure(f"{bound.sentence}; the result is kept in {path}")

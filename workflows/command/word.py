@@ -18,6 +18,7 @@ from typing import Annotated, Any, Literal, Union, get_args, get_origin, get_typ
 
 from cyclopts import Parameter
 
+from tribodyn.extras import package
 from tribodyn.output_file import printable
 from tribodyn.refusal import Refusal, SolveFailed
 from tribodyn.workflows.result import store
@@ -139,6 +140,8 @@ def word(study: Callable[..., Any], words: str, *, into: Into = "results") -> Ca
         make_room(out)
         first = next((texts[option.name] for option in options if option.positional), None)
         folder = out or _folder(first, into)
+        if writes and folder is not None and into != "here":
+            package("matplotlib")  # before long work: what is written has pictures
         values = {option.name: option.value(texts[option.name]) for option in options}
         if overrides is not None:
             values["overrides"] = overrides

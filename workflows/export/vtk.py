@@ -37,7 +37,7 @@ def write_mesh(result: Result, path: Path) -> list[Path]:
     """The part as worn in the last state that is shown, in the format that the ending of a file names.
 
     Raises  ValueError where the result has no mesh or the format cannot hold it"""
-    import meshio
+    meshio = package("meshio")
 
     if result.part is None:
         raise Refusal("mesh: this result keeps no mesh; run a scene with a part and pictures.renders = true")

@@ -2,17 +2,14 @@
 
 from typing import Any
 
-import matplotlib as mpl
 import numpy as np
-from matplotlib.colors import BoundaryNorm, ListedColormap
-from matplotlib.figure import Figure
-from matplotlib.patches import Patch as Swatch
 
 from tribodyn.hbm.contact.contact_law import SEPARATES, SLIPS, STICKS
 from tribodyn.refusal import Refusal
 from tribodyn.workflows.pictures import opened as book
 from tribodyn.workflows.pictures.figures import heading, length_unit, scale_bar, status_name
 from tribodyn.workflows.pictures.loop_plots import loop_of, loop_size
+from tribodyn.workflows.pictures.matplotlib_names import BoundaryNorm, Figure, ListedColormap, Swatch, mpl
 from tribodyn.workflows.pictures.render import MovingPart
 from tribodyn.workflows.pictures.shots import shoot, show, with_room
 from tribodyn.workflows.pictures.theme import BLUE, INK, LAYOUT, MOTION_MAP, RED, STATUS, STYLE

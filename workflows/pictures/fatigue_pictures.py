@@ -3,10 +3,10 @@
 from typing import Any
 
 import numpy as np
-from matplotlib.figure import Figure
 
 from tribodyn.hbm.fatigue import Strength, equivalent_amplitude, equivalent_mean
 from tribodyn.workflows.pictures.figures import axes_of, heading, present, titled
+from tribodyn.workflows.pictures.matplotlib_names import Figure
 from tribodyn.workflows.pictures.theme import CYCLE, INK, RED
 from tribodyn.workflows.pictures.wear_plots import cycle_axis
 from tribodyn.workflows.result.answers import cycles_of, worn_contact

@@ -5,17 +5,23 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, TypeVar
 
-import matplotlib as mpl
 import numpy as np
-from matplotlib.cm import ScalarMappable
-from matplotlib.colors import Normalize, PowerNorm
-from matplotlib.figure import Figure
-from matplotlib.patches import Patch as Swatch
-from matplotlib.ticker import FuncFormatter, LogLocator, MaxNLocator, NullFormatter
 
 from tribodyn.hbm.contact.contact_law import SEPARATES
 from tribodyn.output_file import replacing
 from tribodyn.refusal import Refusal
+from tribodyn.workflows.pictures.matplotlib_names import (
+    Figure,
+    FuncFormatter,
+    LogLocator,
+    MaxNLocator,
+    Normalize,
+    NullFormatter,
+    PowerNorm,
+    ScalarMappable,
+    Swatch,
+    mpl,
+)
 from tribodyn.workflows.pictures.theme import FORMATS, LAYOUT, RED, STATUS, STYLE
 from tribodyn.workflows.result.result import Result
 from tribodyn.workflows.result.summary import LARGEST_BEND, size_of

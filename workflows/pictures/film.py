@@ -10,15 +10,12 @@ from os import PathLike
 from pathlib import Path
 from typing import Any, Literal, Protocol
 
-import matplotlib as mpl
 import numpy as np
-from matplotlib.backends.backend_agg import FigureCanvasAgg
-from matplotlib.figure import Figure
-from PIL import Image
 
 from tribodyn.extras import package
 from tribodyn.refusal import Refusal
 from tribodyn.workflows.pictures.cycle_film import CycleFilm
+from tribodyn.workflows.pictures.matplotlib_names import Figure, FigureCanvasAgg, Image, mpl
 from tribodyn.workflows.pictures.offscreen import check
 from tribodyn.workflows.pictures.theme import LAYOUT, STYLE
 from tribodyn.workflows.pictures.wear_film import WearFilm

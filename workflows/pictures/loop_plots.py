@@ -3,12 +3,11 @@
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-import matplotlib as mpl
 import numpy as np
-from matplotlib.figure import Figure
 
 from tribodyn.refusal import Refusal
 from tribodyn.workflows.pictures.figures import force_unit, heading, length_unit, present
+from tribodyn.workflows.pictures.matplotlib_names import Figure, mpl
 from tribodyn.workflows.pictures.theme import BLUE, STYLE
 from tribodyn.workflows.result.contact_states import state_of
 from tribodyn.workflows.result.result import Result

@@ -3,11 +3,7 @@
 from collections.abc import Sequence
 from typing import Any
 
-import matplotlib as mpl
 import numpy as np
-from matplotlib.collections import PolyCollection
-from matplotlib.figure import Figure
-from matplotlib.tri import Triangulation
 
 from tribodyn.hbm.balance import HarmonicBalance
 from tribodyn.hbm.continuation.nonlinear_modes import Backbone
@@ -22,6 +18,7 @@ from tribodyn.workflows.pictures.figures import (
     status_legend,
     titled,
 )
+from tribodyn.workflows.pictures.matplotlib_names import Figure, PolyCollection, Triangulation, mpl
 from tribodyn.workflows.pictures.theme import LAYOUT, MOTION_MAP, PRESSURE_MAP, STATUS, STYLE, WEAR_MAP
 from tribodyn.workflows.result.contact_states import shown_cycles, shown_states, state_of
 from tribodyn.workflows.result.result import Patch, Result
@@ -98,7 +95,7 @@ def motion_maps(result: Result, rows: Sequence[int] | np.ndarray | None = None) 
     return _motion(patch, columns, labels, titled(result, "contact over wear"))
 
 
-def backbone_maps(balance: HarmonicBalance, mode: Backbone, scene: str = "", columns: int = 4) -> Figure | None:
+def backbone_maps(balance: HarmonicBalance, mode: Backbone, scene: str = "", columns: int = 4) -> "Figure | None":
     """The same at some converged points of a backbone, evenly spaced in the logarithm of the amplitude.
 
     Returns None where the contact is no face or has no friction; scene : its name, for the title"""

@@ -3,11 +3,10 @@
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
-from matplotlib.figure import Figure
-
 from tribodyn.workflows.pictures import maps
 from tribodyn.workflows.pictures.figures import save
 from tribodyn.workflows.pictures.loop_plots import has_friction, hysteresis
+from tribodyn.workflows.pictures.matplotlib_names import Figure
 from tribodyn.workflows.pictures.response_plots import controlled, output_amplitudes, response
 from tribodyn.workflows.pictures.wear_plots import COURSES
 from tribodyn.workflows.result.contact_states import has_states

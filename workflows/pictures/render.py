@@ -5,10 +5,7 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
-import matplotlib as mpl
 import numpy as np
-from matplotlib.figure import Figure
-from PIL import Image, ImageDraw
 
 from tribodyn.workflows.pictures import maps, offscreen, opened as book, view as drawing
 from tribodyn.workflows.pictures.figures import (
@@ -20,6 +17,7 @@ from tribodyn.workflows.pictures.figures import (
     scale_bar,
     status_legend,
 )
+from tribodyn.workflows.pictures.matplotlib_names import Figure, Image, ImageDraw, mpl
 from tribodyn.workflows.pictures.shots import Camera, Layer, View, frame, place, shoot, show, trimmed, with_room
 from tribodyn.workflows.pictures.theme import INK, LAYOUT, MOTION_MAP, PRESSURE_MAP, RED, STYLE, WEAR_MAP
 from tribodyn.workflows.result.contact_states import ContactState, has_states, shown_states

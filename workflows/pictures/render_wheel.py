@@ -4,9 +4,7 @@ A wave repeats every blade one phase later, in its own turned frame: what one bl
 
 from collections.abc import Iterator
 
-import matplotlib as mpl
 import numpy as np
-from matplotlib.figure import Figure
 from scipy.spatial import cKDTree
 
 from tribodyn.extras import package
@@ -14,6 +12,7 @@ from tribodyn.hbm.harmonics import HarmonicBasis
 from tribodyn.hbm.linear.travelling_wave import at_sector
 from tribodyn.workflows.pictures import view as drawing
 from tribodyn.workflows.pictures.figures import heading, length_unit, present, scale_bar
+from tribodyn.workflows.pictures.matplotlib_names import Figure, mpl
 from tribodyn.workflows.pictures.shots import Layer, View, frame, shoot, show, with_room
 from tribodyn.workflows.pictures.theme import LAYOUT, MOTION_MAP, STYLE
 from tribodyn.workflows.result.contact_states import shown_states

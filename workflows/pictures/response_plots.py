@@ -2,9 +2,7 @@
 
 from typing import Any
 
-import matplotlib as mpl
 import numpy as np
-from matplotlib.figure import Figure
 
 from tribodyn.workflows.pictures.figures import (
     axes_of,
@@ -16,6 +14,7 @@ from tribodyn.workflows.pictures.figures import (
     shade_beyond_linear_model,
     titled,
 )
+from tribodyn.workflows.pictures.matplotlib_names import Figure, mpl
 from tribodyn.workflows.pictures.theme import BLUE, CYCLE, GREY, INK, ORANGE, RED, WEAR_MAP
 from tribodyn.workflows.pictures.wear_plots import cycle_unit, with_gaps
 from tribodyn.workflows.result.contact_states import shown_cycles

@@ -4,11 +4,10 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-import matplotlib as mpl
 import numpy as np
-from matplotlib.figure import Figure
 
 from tribodyn.workflows.pictures.figures import heading, present, scale_bar
+from tribodyn.workflows.pictures.matplotlib_names import Figure, mpl
 from tribodyn.workflows.pictures.shots import place, shoot, show, trimmed, with_room
 from tribodyn.workflows.pictures.theme import LAYOUT, PRESSURE_MAP, RED, STYLE
 from tribodyn.workflows.result.contact_states import shown_states

@@ -2,9 +2,7 @@
 
 from typing import Any, ClassVar
 
-import matplotlib as mpl
 import numpy as np
-from matplotlib.figure import Figure
 
 from tribodyn.refusal import Refusal
 from tribodyn.workflows.pictures import opened as book
@@ -17,6 +15,7 @@ from tribodyn.workflows.pictures.figures import (
     scale_bar,
     status_legend,
 )
+from tribodyn.workflows.pictures.matplotlib_names import Figure, mpl
 from tribodyn.workflows.pictures.shots import shoot, show, with_room
 from tribodyn.workflows.pictures.theme import BLUE, LAYOUT, ORANGE, PRESSURE_MAP, RED, STYLE, WEAR_MAP
 from tribodyn.workflows.pictures.view import wear_scale

@@ -4,8 +4,6 @@ from collections.abc import Callable
 from typing import Any
 
 import numpy as np
-from matplotlib.figure import Figure
-from matplotlib.ticker import MaxNLocator
 
 from tribodyn.hbm.wear.history import WearHistory
 from tribodyn.refusal import Refusal
@@ -19,6 +17,7 @@ from tribodyn.workflows.pictures.figures import (
     status_name,
     titled,
 )
+from tribodyn.workflows.pictures.matplotlib_names import Figure, MaxNLocator
 from tribodyn.workflows.pictures.theme import BLUE, GREEN, ORANGE, RED, STATUS
 from tribodyn.workflows.result.contact_states import shown_cycles
 from tribodyn.workflows.result.result import Result

@@ -11,15 +11,14 @@ from html import escape
 from pathlib import Path
 from typing import Any
 
-import matplotlib as mpl
 import numpy as np
-from matplotlib.figure import Figure
 
 from tribodyn.extras import package
 from tribodyn.output_file import write_text
 from tribodyn.refusal import Refusal
 from tribodyn.version import __version__
 from tribodyn.workflows.pictures import offscreen, plots, render
+from tribodyn.workflows.pictures.matplotlib_names import Figure, mpl
 from tribodyn.workflows.pictures.theme import STYLE
 from tribodyn.workflows.report import text
 from tribodyn.workflows.report.charts import charts, solid

@@ -18,12 +18,15 @@ def forget_peak() -> None:
 
 
 def peak() -> float:
-    """Largest memory since `forget_peak` [bytes]; since the start of the process where the system cannot forget."""
+    """Largest memory since `forget_peak` [bytes]; since the start of the process where the system cannot forget,
+    nan on Windows."""
     try:
         lines = Path("/proc/self/status").read_text().splitlines()
         return 1024.0 * next(int(line.split()[1]) for line in lines if line.startswith("VmHWM"))
     except (OSError, StopIteration):
-        import resource  # which Windows has not
+        if sys.platform == "win32":
+            return float("nan")
+        import resource
 
         unit = 1 if sys.platform == "darwin" else 1024
         return float(unit * resource.getrusage(resource.RUSAGE_SELF).ru_maxrss)

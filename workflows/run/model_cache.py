@@ -176,6 +176,8 @@ def _signing_key(path: Path) -> bytes:
 
 def _require_private(path: Path, forbidden: int) -> None:
     """Raise OSError where a file or folder is another user's, or has bits of its mode that are forbidden."""
+    if not hasattr(os, "getuid"):  # Windows has no such bits; the folder of a profile is its user's own
+        return
     status = path.stat()
     if status.st_uid != os.getuid() or status.st_mode & forbidden:
         raise PermissionError(errno.EPERM, "others can change it", str(path))

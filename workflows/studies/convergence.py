@@ -10,15 +10,13 @@ from os import fspath
 from pathlib import Path
 from typing import Any
 
-import matplotlib as mpl
 import numpy as np
-from matplotlib.figure import Figure
-from matplotlib.ticker import NullFormatter
 
 from tribodyn.hbm.quantity import names_with_error, quantity_named
 from tribodyn.refusal import Refusal
 from tribodyn.workflows.errors.ladder_table import SOLVED, LadderRow, LadderTable, LadderTables, measure_ladders
 from tribodyn.workflows.errors.ladders import SPRINGS
+from tribodyn.workflows.pictures.matplotlib_names import Figure, NullFormatter, mpl
 from tribodyn.workflows.pictures.theme import GREY, STYLE
 from tribodyn.workflows.result.summary import plain
 from tribodyn.workflows.run.progress import Report, reporter
@@ -148,7 +146,7 @@ def costs(table: LadderTables) -> Figure:
     with mpl.rc_context(STYLE):
         figure = Figure(figsize=(4.2 * len(shown) + 1.6, 4.0), layout="constrained")
         panes = figure.subplots(1, len(shown), squeeze=False)[0]
-        colours = mpl.colormaps["tab20"].colors  # type: ignore[attr-defined]
+        colours = mpl.colormaps["tab20"].colors
         for pane, quantity in zip(panes, shown, strict=True):
             for i, ladder in enumerate(table.ladders):
                 points = [

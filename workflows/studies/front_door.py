@@ -5,6 +5,7 @@ from os import PathLike
 from pathlib import Path
 
 from tribodyn.consent import asks_consent
+from tribodyn.extras import package
 from tribodyn.output_file import set_aside
 from tribodyn.refusal import Refusal
 from tribodyn.workflows.errors import accuracy as errors
@@ -71,6 +72,8 @@ def run(
         if pictures or resume:
             raise Refusal(f"{'pictures' if pictures else 'resume'} needs a folder: give run a folder")
         return pipeline.run(file, None, reporter(progress), judge=with_verdict)
+    if pictures:
+        package("matplotlib")  # before long work
     place = Path(folder)
     place.mkdir(parents=True, exist_ok=True)
     path = place / "result.h5"

@@ -8,7 +8,6 @@ from time import process_time
 from typing import Any, Literal
 
 import numpy as np
-from matplotlib.figure import Figure
 
 from tribodyn.hbm import quantity
 from tribodyn.hbm.derivatives.derivative_rules import NoDerivative
@@ -18,6 +17,7 @@ from tribodyn.hbm.quantity import CycleQuantity, StatedQuantity, WearQuantity
 from tribodyn.hbm.threads import limited
 from tribodyn.refusal import SolveFailed
 from tribodyn.workflows.pictures.figures import axes_of, named
+from tribodyn.workflows.pictures.matplotlib_names import Figure
 from tribodyn.workflows.pictures.theme import CYCLE, GREY
 from tribodyn.workflows.run import pipeline, response_curve, wear_run
 from tribodyn.workflows.run.parameter_variation import ParameterVariation

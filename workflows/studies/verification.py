@@ -7,7 +7,6 @@ from pathlib import Path
 from typing import Any, Literal
 
 import numpy as np
-from matplotlib.figure import Figure
 
 from tribodyn.consent import asks_consent
 from tribodyn.hbm import newton
@@ -24,6 +23,7 @@ from tribodyn.hbm.wear.history import WearRow
 from tribodyn.refusal import Refusal, SolveFailed
 from tribodyn.workflows.errors.time_comparison import steps_of
 from tribodyn.workflows.pictures.figures import axes_of, force_unit, length_unit
+from tribodyn.workflows.pictures.matplotlib_names import Figure
 from tribodyn.workflows.pictures.theme import BLUE, ORANGE
 from tribodyn.workflows.result.number_format import named_lines
 from tribodyn.workflows.result.provenance import rebuilt

@@ -8,7 +8,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from matplotlib.figure import Figure
 from scipy.interpolate import PchipInterpolator
 
 from tribodyn.hbm.balance import HarmonicBalance
@@ -18,6 +17,7 @@ from tribodyn.hbm.threads import limited
 from tribodyn.refusal import Refusal, SolveFailed
 from tribodyn.workflows.pictures.figures import axes_of, length_unit, named
 from tribodyn.workflows.pictures.maps import backbone_maps
+from tribodyn.workflows.pictures.matplotlib_names import Figure
 from tribodyn.workflows.pictures.theme import BLUE, GREY, ORANGE
 from tribodyn.workflows.result.number_format import named_lines
 from tribodyn.workflows.run import modelling, settings

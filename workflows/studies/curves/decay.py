@@ -5,7 +5,6 @@ from pathlib import Path
 from typing import Annotated, Any
 
 import numpy as np
-from matplotlib.figure import Figure
 from scipy.interpolate import PchipInterpolator
 
 from tribodyn.hbm import rest
@@ -18,6 +17,7 @@ from tribodyn.hbm.time.decrement import decrement
 from tribodyn.hbm.time.ring_down import RingDown
 from tribodyn.refusal import Refusal, SolveFailed
 from tribodyn.workflows.pictures.figures import axes_of, length_unit, log_axis
+from tribodyn.workflows.pictures.matplotlib_names import Figure
 from tribodyn.workflows.pictures.theme import BLUE, ORANGE
 from tribodyn.workflows.result.number_format import named_lines
 from tribodyn.workflows.run import modelling, settings

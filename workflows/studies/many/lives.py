@@ -7,12 +7,12 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from matplotlib.figure import Figure
 
 from tribodyn.hbm.quantity import names_with_error
 from tribodyn.output_file import write_text
 from tribodyn.refusal import Refusal
 from tribodyn.workflows.pictures.figures import write_figure
+from tribodyn.workflows.pictures.matplotlib_names import Figure
 from tribodyn.workflows.run.progress import Progress, Report, reporter
 from tribodyn.workflows.scene import scene_file
 from tribodyn.workflows.scene.fields import Number

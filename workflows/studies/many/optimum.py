@@ -15,11 +15,11 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from matplotlib.figure import Figure
 
 from tribodyn.output_file import write_text
 from tribodyn.refusal import SolveFailed
 from tribodyn.workflows.pictures.figures import write_figure
+from tribodyn.workflows.pictures.matplotlib_names import Figure
 from tribodyn.workflows.run.progress import Report, reporter
 from tribodyn.workflows.scene.scene_file import AnyPath, SceneError
 from tribodyn.workflows.studies.many import study_file, study_pictures, study_runs as studies

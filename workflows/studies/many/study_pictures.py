@@ -4,15 +4,20 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-import matplotlib as mpl
 import numpy as np
-from matplotlib.figure import Figure
-from matplotlib.ticker import FuncFormatter, LogLocator, MaxNLocator, NullFormatter
 from scipy import stats
 
 from tribodyn.hbm.quantity import StatedQuantity, names_with_error, quantities_of
 from tribodyn.refusal import Refusal
 from tribodyn.workflows.pictures.figures import axes_of
+from tribodyn.workflows.pictures.matplotlib_names import (
+    Figure,
+    FuncFormatter,
+    LogLocator,
+    MaxNLocator,
+    NullFormatter,
+    mpl,
+)
 from tribodyn.workflows.pictures.theme import BLUE, GREY, INK, ORANGE, RED, STYLE
 from tribodyn.workflows.studies.many.run_task import RUN
 

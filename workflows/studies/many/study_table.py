@@ -11,12 +11,12 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, get_args
 
 import numpy as np
-from matplotlib.figure import Figure
 from scipy import stats
 
 from tribodyn.hbm.quantity import StatedQuantity, names_with_error, quantities_of
 from tribodyn.output_file import cell, replacing, set_aside
 from tribodyn.refusal import Refusal
+from tribodyn.workflows.pictures.matplotlib_names import Figure
 from tribodyn.workflows.studies.many import study_pictures
 from tribodyn.workflows.studies.many.distributions import si
 from tribodyn.workflows.studies.many.run_task import RUN, RunRow, Status

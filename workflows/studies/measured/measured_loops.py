@@ -6,11 +6,11 @@ from pathlib import Path
 from typing import Annotated, Any
 
 import numpy as np
-from matplotlib.figure import Figure
 
 from tribodyn.output_file import write_text
 from tribodyn.refusal import Refusal
 from tribodyn.workflows.pictures.figures import axes_of, length_unit
+from tribodyn.workflows.pictures.matplotlib_names import Figure
 from tribodyn.workflows.pictures.theme import BLUE, CYCLE, GREY, ORANGE
 from tribodyn.workflows.result.number_format import measured, named_lines
 from tribodyn.workflows.scene.fields import Frequency, Number, quantity

@@ -3,11 +3,11 @@
 from typing import Any
 
 import numpy as np
-from matplotlib.figure import Figure
 
 from tribodyn.geometry.height_map import centred, level
 from tribodyn.geometry.worn_volume import WornFace
 from tribodyn.workflows.pictures.figures import axes_of, length_unit
+from tribodyn.workflows.pictures.matplotlib_names import Figure
 from tribodyn.workflows.pictures.theme import BLUE, GREY, ORANGE, WEAR_MAP
 from tribodyn.workflows.studies.scans.wear_coefficient import WearCoefficient
 

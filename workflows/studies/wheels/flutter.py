@@ -5,7 +5,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from matplotlib.figure import Figure
 
 from tribodyn.hbm.balance import HarmonicBalance
 from tribodyn.hbm.continuation.limit_cycles import LimitCycle, in_time, limit_cycles
@@ -16,6 +15,7 @@ from tribodyn.reduction.flow import Flow, aeroelastic, with_flow
 from tribodyn.reduction.wave_model import travelling_wave
 from tribodyn.refusal import Refusal
 from tribodyn.workflows.pictures.figures import axes_of
+from tribodyn.workflows.pictures.matplotlib_names import Figure
 from tribodyn.workflows.pictures.theme import BLUE, GREY, RED
 from tribodyn.workflows.run import modelling, settings
 from tribodyn.workflows.run.settings import OUTPUT

@@ -9,10 +9,10 @@ from functools import cached_property
 from pathlib import Path
 
 import numpy as np
-from matplotlib.figure import Figure
 
 from tribodyn.hbm.threads import limited
 from tribodyn.workflows.pictures.figures import axes_of, write_figure
+from tribodyn.workflows.pictures.matplotlib_names import Figure
 from tribodyn.workflows.pictures.theme import BLUE, GREY, INK, ORANGE, RED
 from tribodyn.workflows.result.number_format import write_columns
 from tribodyn.workflows.run.checkpoint import alone_in

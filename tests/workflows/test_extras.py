@@ -1,0 +1,138 @@
+"""The solver alone, without the packages of its extras and without what Windows has not: what runs, what is refused."""
+
+import ast
+import json
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from tests.helpers.matrix_scene import matrix_folder
+from tribodyn.extras import EXTRA
+
+ROOT = Path(__file__).parents[2]
+FOLDERS = ("geometry", "fem", "reduction", "hbm", "workflows", "src/tribodyn")
+POSIX = {
+    "os": {
+        "fork", "forkpty", "getuid", "geteuid", "getgid", "kill", "killpg", "nice", "setsid", "sched_getaffinity",
+        "sysconf", "wait", "waitpid", "mkfifo", "chown", "statvfs",
+    },
+    "signal": {"SIGKILL", "SIGPIPE", "SIGHUP", "SIGALRM", "SIGUSR1", "alarm", "setitimer", "pause"},
+}  # fmt: skip
+MODULES = {"fcntl", "resource", "pwd", "grp", "termios", "tty", "pty", "posix"}
+GUARDS = ("sys.platform", "hasattr(", "getattr(", '"SC_PAGE_SIZE"')
+OF_LINUX = {"_works_in_child", "_run_in_silence"}  # called where sys.platform is linux
+SOLVER_ALONE = """
+import contextlib, importlib, importlib.abc, io, json, os, pkgutil, signal, sys
+import cyclopts, filelock, h5py, multiprocessing.context, numba, numpy, pydantic, rich, scipy.linalg, subprocess
+
+class Absent(importlib.abc.MetaPathFinder):
+    def find_spec(self, name, path=None, target=None):
+        if name.partition(".")[0] in ABSENT:
+            raise ModuleNotFoundError(f"No module named {name!r}", name=name)
+
+sys.meta_path.insert(0, Absent())
+for module, names in POSIX.items():
+    for name in names:
+        if hasattr(sys.modules[module], name):
+            delattr(sys.modules[module], name)
+
+import tribodyn
+for module in pkgutil.walk_packages(tribodyn.__path__, "tribodyn."):
+    if not module.name.endswith("__main__"):
+        importlib.import_module(module.name)
+
+from tribodyn.workflows.command import main
+ends = []
+for words in COMMANDS:
+    out, err = io.StringIO(), io.StringIO()
+    with contextlib.redirect_stdout(out), contextlib.redirect_stderr(err):
+        try:
+            main.main(words)
+        except SystemExit as end:
+            code = end.code or 0
+    ends.append([code, out.getvalue(), err.getvalue()])
+print(json.dumps(ends))
+"""
+SHORT = ["--set", "wear=", "--set", "response.points=4", "--set", "verdict.enabled=false"]
+
+
+@pytest.fixture(scope="module")
+def ends(tmp_path_factory: pytest.TempPathFactory) -> list[tuple[int, str, str]]:
+    """Exit code, output and errors of commands where nothing but the solver's packages is there."""
+    folder = matrix_folder(tmp_path_factory.mktemp("alone"))
+    commands = [
+        ["run", "own.toml", *SHORT, "--out", "out"],
+        ["run", "own.toml", *SHORT, "--out", "out2", "--no-pictures", "--quiet"],
+        ["run", "beam"],
+        ["draw", "out"],
+        ["report", "out"],
+        ["study", "converge", "own.toml"],
+        ["export", "out", "--to", "csv"],
+    ]
+    absent = [*EXTRA, *MODULES - {"posix"}]
+    head = f"ABSENT, POSIX, COMMANDS = {absent!r}, {POSIX!r}, {commands!r}\n"
+    words = [sys.executable, "-c", head + SOLVER_ALONE]
+    done = subprocess.run(words, cwd=folder, capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr
+    return [tuple(end) for end in json.loads(done.stdout.splitlines()[-1])]
+
+
+def test_matrices_are_solved_by_the_solver_alone(ends: list[tuple[int, str, str]]) -> None:
+    with_pictures, without, export = ends[0], ends[1], ends[6]
+    assert [with_pictures[0], without[0], export[0]] == [0, 0, 0], ends
+    sentence = 'no pictures: this needs the package matplotlib: install it with pip install "tribodyn[pictures]"'
+    assert with_pictures[1].count(sentence) == 1
+    assert not without[1] + without[2]
+
+
+@pytest.mark.parametrize(
+    ("number", "package", "extra"),
+    [
+        (2, "gmsh", "mesh"), (3, "matplotlib", "pictures"), (4, "matplotlib", "pictures"),
+        (5, "matplotlib", "pictures"),
+    ],
+)  # fmt: skip
+def test_a_missing_package_is_one_sentence(
+    ends: list[tuple[int, str, str]], number: int, package: str, extra: str
+) -> None:
+    code, _, error = ends[number]
+    assert code == 2
+    sentence = f'tribodyn: this needs the package {package}: install it with pip install "tribodyn[{extra}]".\n'
+    assert error == sentence
+
+
+def _posix_words(tree: ast.AST) -> list[str]:
+    words = []
+    for node in ast.walk(tree):
+        if isinstance(node, ast.Attribute) and isinstance(node.value, ast.Name):
+            words += [node.attr] if node.attr in POSIX.get(node.value.id, ()) else []
+        elif isinstance(node, ast.Import | ast.ImportFrom):
+            names = [alias.name for alias in node.names] if isinstance(node, ast.Import) else [str(node.module)]
+            words += sorted(MODULES.intersection(names))
+        elif isinstance(node, ast.Constant) and node.value in ("fork", "forkserver"):
+            words.append(node.value)
+    return words
+
+
+def unguarded(text: str) -> list[str]:
+    """What a source calls that Windows has not: at its head, or in a function that does not ask for the system."""
+    tree = ast.parse(text)
+    functions = [node for node in ast.walk(tree) if isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef)]
+    words = []
+    for function in functions:
+        source = ast.get_source_segment(text, function) or ""
+        if function.name not in OF_LINUX and not any(guard in source for guard in GUARDS):
+            words += _posix_words(function)
+        function.body = [ast.Pass()]
+    return words + _posix_words(tree)
+
+
+def test_what_windows_has_not_is_called_behind_a_question_for_the_system() -> None:
+    files = [path for folder in FOLDERS for path in sorted((ROOT / folder).rglob("*.py"))]
+    met = {path.name: words for path in files if (words := unguarded(path.read_text(encoding="utf-8")))}
+    assert met == {}
+    assert unguarded("import os\nos.fork()") == ["fork"]
+    assert unguarded("def f():\n    import fcntl\n    os.kill(1, signal.SIGKILL)") == ["fcntl", "kill", "SIGKILL"]
+    assert unguarded("def f():\n    if sys.platform == 'linux':\n        os.fork()") == []
