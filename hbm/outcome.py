@@ -35,6 +35,7 @@ class SolveEnd(End):
 
     CONVERGED = "converged"
     BESIDE_PEAK = "converged beside a peak that was not found"
+    UNLIMITED = "nothing limits the resonance at"
     STEPS_SPENT = "not converged in"
     NO_DESCENT = "no descent from relative residual"
     NOT_FINITE = "the residual is not a finite number"
@@ -50,6 +51,7 @@ class SolveEnd(End):
 
 CONVERGED: Final = SolveEnd.CONVERGED.say()
 """The outcome of a solve that reached its tolerance."""
+SOLVED: Final = (SolveEnd.CONVERGED, SolveEnd.BESIDE_PEAK, SolveEnd.UNLIMITED)  # ends with a solution
 
 
 class BranchEnd(End):

@@ -11,7 +11,7 @@ import numpy as np
 from tribodyn.hbm.continuation.parameter import LOAD, Parameter
 from tribodyn.hbm.harmonics import amplitude
 from tribodyn.hbm.newton import Solution
-from tribodyn.hbm.outcome import BranchEnd, Outcome, SolveEnd
+from tribodyn.hbm.outcome import SOLVED, BranchEnd, Outcome, SolveEnd
 
 STRESS, GAUGE = "stress ", "gauge "
 """What the names of outputs begin with that are components of stress [Pa], and strains."""
@@ -32,7 +32,7 @@ class Branch:
     harmonics : that the coefficients have
     contact : (n_point, n_pair * n_component, n_coeff) relative displacement [m]
     energy : (n_point,) dissipated energy per cycle, all pairs [J]
-    outcome : for each point CONVERGED, BESIDE_PEAK (a solution), or what went wrong
+    outcome : for each point CONVERGED, BESIDE_PEAK or UNLIMITED (a solution), or what went wrong
     newton_steps : (n_point,) Newton steps spent
     end : why and where the branch ends; its text is a sentence
     folds : indices of the points that are folds, where the branch turns back
@@ -66,7 +66,7 @@ class Branch:
     @property
     def converged(self) -> np.ndarray:
         """(n_point,) whether the point is a solution."""
-        return np.array([outcome.kind in (SolveEnd.CONVERGED, SolveEnd.BESIDE_PEAK) for outcome in self.outcome])
+        return np.array([outcome.kind in SOLVED for outcome in self.outcome])
 
     @property
     def frequency(self) -> np.ndarray:
@@ -114,10 +114,11 @@ class Branch:
         for i in (self.highest(output) - 1, self.highest(output) + 1):
             if not self.converged[i]:
                 return f"the response is highest beside {self.frequency[i]:.5g} Hz, where no solution was found"
-        unsolved = [
-            hertz for hertz, end in zip(self.frequency, self.outcome, strict=True) if end.kind is SolveEnd.BESIDE_PEAK
-        ]
-        return f"none was found beside the point at {unsolved[0]:.5g} Hz; more response.points" if unsolved else ""
+        for hertz, end in zip(self.frequency, self.outcome, strict=True):
+            if end.kind in SOLVED[1:]:
+                beside = f"none was found beside the point at {hertz:.5g} Hz; more response.points"
+                return beside if end.kind is SolveEnd.BESIDE_PEAK else str(end)
+        return ""
 
     def inserted(self, at: int, point: BranchPoint) -> Branch:
         """The branch with one more point before point `at`."""

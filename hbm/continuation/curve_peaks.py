@@ -23,7 +23,7 @@ from tribodyn.hbm.continuation.operating_point import OperatingPoint
 from tribodyn.hbm.continuation.peak_refinement import NoPeak
 from tribodyn.hbm.linear.resonances import narrow_resonances
 from tribodyn.hbm.newton import Solution
-from tribodyn.hbm.outcome import CONVERGED, SolveEnd
+from tribodyn.hbm.outcome import CONVERGED, Outcome, SolveEnd
 from tribodyn.hbm.threads import single
 
 if TYPE_CHECKING:
@@ -59,11 +59,11 @@ def with_peaks(balance: HarmonicBalance, branch: Branch, site: AtPeak) -> Branch
     """The curve with its highest peaks among its points, in their order.
 
     branch : over the frequency; site : of which output, and how exactly
-    A maximum that no solve makes higher stays the point that it is, marked where the search for its peak has failed or
-    ended lower and that is foreseen higher than all that is solved"""
+    A maximum that no solve makes higher stays the point that it is. It is marked where the search for its peak failed
+    or ended lower, on another part of the curve, and it is foreseen highest; and where nothing limits its resonance"""
     branch = _with_narrow_resonances(balance, branch, site)
     insertions: list[tuple[int, BranchPoint]] = []
-    failed: list[_Candidate] = []
+    failed: list[tuple[float, int, Outcome[SolveEnd]]] = []
     heights = branch.amplitude(site.output)
     highest = float(branch.height(site.output).max())
     for candidate in _candidates(balance, branch, site)[: RULES.max_refined]:
@@ -76,9 +76,10 @@ def with_peaks(balance: HarmonicBalance, branch: Branch, site: AtPeak) -> Branch
             point = None
             with suppress(NoPeak):  # it still rises at the highest frequency that is modelled
                 point = site.solve_between(balance, float(branch.omega[i]), solved_x, candidate.low, candidate.high)
-        lowest = (1 - site.tolerance) * heights[i]  # lower than that lies on another part of the curve
-        if point is None or not point.solution.converged or point.amplitude < lowest:
-            failed += [candidate]
+        if point is None or not point.solution.converged or point.amplitude < (1 - site.tolerance) * heights[i]:
+            failed += [(max(candidate.height, heights[i]), i, SolveEnd.BESIDE_PEAK.say())]
+            if point is not None and point.solution.outcome.kind is SolveEnd.UNLIMITED:
+                failed[-1] = (np.inf, i, point.solution.outcome)
             continue
         state, inside = point.state, candidate.turns or candidate.low < point.state.omega < candidate.high
         if not inside or not point.amplitude > heights[i]:
@@ -86,9 +87,8 @@ def with_peaks(balance: HarmonicBalance, branch: Branch, site: AtPeak) -> Branch
         at = i + 1 if _lies_behind(branch, i, state.omega, state.flat) else i
         insertions.append((at, _branch_point(balance, state, point.solves)))
         highest = max(highest, point.amplitude)
-    unsolved = {candidate.point for candidate in failed if max(candidate.height, heights[candidate.point]) >= highest}
-    marked = (SolveEnd.BESIDE_PEAK.say() if i in unsolved else outcome for i, outcome in enumerate(branch.outcome))
-    branch = replace(branch, outcome=tuple(marked))
+    marks = {i: outcome for height, i, outcome in failed if height >= highest}
+    branch = replace(branch, outcome=tuple(marks.get(i, outcome) for i, outcome in enumerate(branch.outcome)))
     for at, solved in sorted(insertions, key=lambda item: -item[0]):
         branch = branch.inserted(at, solved)
     return branch

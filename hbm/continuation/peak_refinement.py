@@ -148,9 +148,11 @@ class PeakRefinement:
                 f"the resonance peak of {self._condition.output} has moved beyond {omega_max / (2 * np.pi):.5g} Hz, "
                 "the highest frequency that is modelled: extend response.frequency"
             )
+        hertz, rises = best.omega / (2 * np.pi), "rises" if best.slope > 0 else "falls"
+        if best.omega > self._condition.max_growth * best.width and best.miss > self._condition.tolerance:
+            return replace(best.solution, outcome=SolveEnd.UNLIMITED.say(f" {hertz:.5g} Hz"))
         if self._miss <= self._condition.near_peak:  # sampled forces have kinks, where the slope jumps
             return best.solution
-        hertz, rises = best.omega / (2 * np.pi), "rises" if best.slope > 0 else "falls"
         detail = f" {self._solves} solves: the curve ends at {hertz:.5g} Hz, where it still {rises}"
         return replace(best.solution, outcome=SolveEnd.SITE_NOT_FOUND.say(detail))
 

@@ -17,7 +17,7 @@ from tribodyn.hbm.continuation.methods import adaptive, arc_length
 from tribodyn.hbm.continuation.operating_point import DominantPeak, FrequencyCorrection, OperatingPoint
 from tribodyn.hbm.continuation.peak_refinement import NoPeak, PeakRefinement
 from tribodyn.hbm.newton import NewtonOptions, Solution
-from tribodyn.hbm.outcome import CONVERGED, BranchEnd, SolveEnd
+from tribodyn.hbm.outcome import CONVERGED, SOLVED, BranchEnd, SolveEnd
 from tribodyn.hbm.threads import single
 
 
@@ -45,7 +45,7 @@ class AtPeak:
     first_stride : first step from a neighbouring peak, in half widths of the resonance
     outside_reach : half widths between the points next to a maximum of a scan, by which its peak may lie outside them
     max_refined : maxima of a scan that are refined in turn, the highest first
-    max_growth : of the response, over that at an end of the range, beyond which a resonance is unbounded
+    max_growth : of a response over that at an end of the range, or a resonance in half widths, that nothing limits
     Those from `scan_harmonic_above` on: see docs/developers/ablations.md"""
 
     output: str
@@ -84,7 +84,7 @@ class AtPeak:
             with suppress(NoPeak):
                 scanned = self._highest(reduced, branch, self._candidates(branch))
                 peak = self._with_all_harmonics(reduced, balance, scanned)
-                if peak.solution.converged:
+                if peak.solution.outcome.kind in SOLVED:
                     return replace(peak, solves=peak.solves + scanned.solves)
         branch = self._scan(balance)
         if branch.end.kind is BranchEnd.ENDED:
@@ -92,7 +92,7 @@ class AtPeak:
             heights = [scan.amplitude(self.output)[scan.converged].max(initial=0.0) for scan in (branch, backward)]
             branch = backward if heights[1] > heights[0] else branch
         peak = self._highest(balance, branch, self._candidates(branch))
-        return peak if peak.solution.converged else self._by_arc_length(balance, peak)
+        return peak if peak.solution.outcome.kind in SOLVED else self._by_arc_length(balance, peak)
 
     def _by_arc_length(self, balance: HarmonicBalance, peak: OperatingPoint) -> OperatingPoint:
         """The peak of the curve round a search that has failed, followed round its folds; else the failed one."""
@@ -101,15 +101,14 @@ class AtPeak:
         for low, high in ((start, stop), (max(near[0], start), min(near[1], stop))):
             curve = arc_length.follow(balance, low, high, arc_length.Options(max_growth=growth, newton=self.newton))
             if np.linalg.norm(curve.contact[-1]) > growth * np.linalg.norm(curve.contact[0]) > 0:
-                detail = f" {peak.solves} solves: nothing limits the resonance at {curve.omega[-1] / 2 / np.pi:.5g} Hz"
-                break
+                outcome = SolveEnd.UNLIMITED.say(f" {curve.omega[-1] / 2 / np.pi:.5g} Hz")
+                return replace(peak, solution=replace(peak.solution, outcome=outcome))
             if curve.arrived and not curve.no_peak(self.output):
                 on_arc = peak_on_arc(balance, curve, curve.highest(self.output), self)
                 lowest = (1 - self.tolerance) * peak.amplitude
                 if on_arc is not None and on_arc.solution.converged and on_arc.amplitude > lowest:
                     return replace(on_arc, solves=peak.solves + len(curve.omega) + on_arc.solves)
-        else:
-            detail = f"{peak.solution.outcome.detail}; by arc length the curve {curve.end}, without a peak"
+        detail = f"{peak.solution.outcome.detail}; by arc length the curve {curve.end}, without a peak"
         return replace(peak, solution=replace(peak.solution, outcome=SolveEnd.SITE_NOT_FOUND.say(detail)))
 
     @single
@@ -213,7 +212,7 @@ class AtPeak:
             larger = balance if harmonics == balance.basis.harmonics else balance.with_harmonics(harmonics)
             x, omega = _transferred(current, point, larger), point.state.omega
             peak = self.solve_near(larger, omega, x)
-            if not peak.solution.converged:
+            if peak.solution.outcome.kind not in SOLVED:
                 peak = self._solve_at(larger, omega, x, peak.solves)
             peak = replace(peak, solves=peak.solves + point.solves)
             if accept_fewer and not peak.solution.converged:
@@ -244,7 +243,7 @@ class AtPeak:
             solved_x = {omega: balance.shaped(branch.contact[row])}
             peak = PeakRefinement(self, balance, omega, solved_x, 0.5 * width, limits).run()
             solves += peak.solves
-            if peak.solution.converged:
+            if peak.solution.outcome.kind in SOLVED:  # no lower one is taken for a resonance that nothing limits
                 break
         return replace(peak, solves=solves)
 

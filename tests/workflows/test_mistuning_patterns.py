@@ -10,7 +10,7 @@ from tests.helpers.wheel_scene import WHEEL
 from tribodyn.workflows.command import main as cli
 from tribodyn.workflows.scene import scene_file
 from tribodyn.workflows.scene.scene_file import SceneError
-from tribodyn.workflows.scene.wheel_scene import Mistuning
+from tribodyn.workflows.scene.wheel_tables import Mistuning
 from tribodyn.workflows.studies.wheels import mistuned_blades, patterns
 
 CHANGED = {

@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from proof import bracket
-from tribodyn.workflows.errors import operating_states
+from tribodyn.workflows.errors import judgement, operating_states
+from tribodyn.workflows.report import text
 from tribodyn.workflows.result.summary import numbers
 from tribodyn.workflows.run import modelling, pipeline
 from tribodyn.workflows.run.progress import Progress
@@ -123,3 +124,14 @@ def test_errors_are_of_the_point_in_the_head_peak_or_not(low: float, high: float
         assert state.values[name] == pytest.approx(head[name]["first"], rel=1e-12)
     again = state.site.solve_near(state.balance, state.point.state.omega, state.point.state.x)
     assert low < 0.1 or again.amplitude == pytest.approx(state.point.amplitude, rel=1e-9)
+
+
+@pytest.mark.parametrize(("K", "hertz"), [([[1.0]], 0.5 / np.pi), ([[2.0, -1], [-1, 1]], (5**0.5 - 1) / (4 * np.pi))])
+def test_a_resonance_that_nothing_limits_has_no_number(K: list[list[float]], hertz: float, tmp_path: Path) -> None:
+    """Closed form: the force works more than friction, 4 / pi of 0.0219; one mass and two in a row (golden ratio)."""
+    np.savez(tmp_path / "part.npz", M=1e4 * np.eye(len(K)), K=1e4 * np.array(K))
+    file = parse(RUBBING.format(dofs=[[0]], low=0.05, high=0.4), "masses.toml", ("response.points=60",), tmp_path)
+    result = pipeline.run(file, None, Progress(), judge=judgement.with_verdict)
+    reason = f"no peak: nothing limits the resonance at {hertz:.5g} Hz"
+    assert reason in "\n".join(text.brief(result))
+    assert result.verdict.statements["amplitude"].reason == reason

@@ -16,7 +16,7 @@ from tribodyn.hbm.continuation.peak_refinement import NoPeak
 from tribodyn.hbm.continuation.resonance_peak import AtPeak
 from tribodyn.hbm.harmonics import HarmonicBasis
 from tribodyn.hbm.newton import Solution
-from tribodyn.hbm.outcome import CONVERGED
+from tribodyn.hbm.outcome import CONVERGED, SolveEnd
 from tribodyn.hbm.quantity import CycleQuantity, ErrorKind, SolvedCycle, WornContact, of_wear_with_error, with_error
 from tribodyn.hbm.wear.history import LIFE_SHARE
 from tribodyn.refusal import Refusal, SolveFailed, SolverFailure
@@ -105,7 +105,9 @@ def first_state(file: SceneFile, balance: HarmonicBalance, result: Result) -> Op
 
 
 def state_at_peak(scene: Scene, balance: HarmonicBalance, branch: Branch) -> OperatingState:
-    """The state at the highest point of a response as it is; one that is no peak is found again at its frequency."""
+    """The state at the highest point, which is no peak at its frequency; NoPeak where nothing limits a resonance."""
+    if any(outcome.kind is SolveEnd.UNLIMITED for outcome in branch.outcome):
+        raise NoPeak(f"no peak: {branch.no_peak(settings.OUTPUT)}")
     point = highest_point(branch, balance)
     site: OperatingCondition | PeakOfCurve = settings.peak_of(scene)
     if branch.no_peak(settings.OUTPUT):

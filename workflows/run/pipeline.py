@@ -7,6 +7,7 @@ import platform
 from collections.abc import Callable
 from dataclasses import replace
 from datetime import UTC, datetime
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -98,12 +99,8 @@ def run(
             result = with_shown(scene, result, model.balance, model.part)
         if scene.wear is not None and scene.wear.responses and result.wear_steps:
             with progress.track("responses of the worn contact") as advance:
-
-                def follow_worn(worn: HarmonicBalance) -> Branch:
-                    return response_curve.follow_response(scene, worn, folds=False)
-
-                count = scene.wear.responses
-                curves = response_curve.worn_responses(result, model.balance, count, follow_worn, advance)
+                follow, count = partial(response_curve.follow_response, scene, folds=False), scene.wear.responses
+                curves = response_curve.worn_responses(result, model.balance, count, follow, advance)
                 result = keep(replace(result, worn=curves))
         if judge is not None and scene.verdict.enabled and scene.response.control == "force":
             result = judge(file, model, result, progress)

@@ -46,7 +46,8 @@ from tribodyn.workflows.scene.user_files import folder_of
 from tribodyn.workflows.scene.wear import Wear
 
 if TYPE_CHECKING:
-    from tribodyn.workflows.scene.wheel_scene import FlowTable, Mistuning, WheelScene, WheelTable
+    from tribodyn.workflows.scene.wheel_scene import WheelScene
+    from tribodyn.workflows.scene.wheel_tables import FlowTable, Mistuning, WheelTable
 else:  # a scene without a wheel has none of them: see WheelScene in wheel_scene
     FlowTable = Mistuning = WheelTable = NoneType
 

@@ -1,5 +1,6 @@
 """The distribution of a life, or of another number, over what scatters: runs, quantiles, and what to measure next."""
 
+import json
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
@@ -8,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from tribodyn.hbm.quantity import names_with_error
+from tribodyn.output_file import write_text
 from tribodyn.refusal import Refusal
 from tribodyn.workflows.pictures.figures import write_figure
 from tribodyn.workflows.pictures.matplotlib_names import Figure
@@ -25,14 +27,15 @@ from tribodyn.workflows.studies.many.quantiles import RARE, Influence, Sample, i
 from tribodyn.workflows.studies.many.run_task import solve
 from tribodyn.workflows.studies.many.study_file import LISTED, ParameterStudy
 from tribodyn.workflows.studies.many.study_runs import Runner
-from tribodyn.workflows.studies.many.study_table import LIFE, Journal, StudyTable, TableResult
+from tribodyn.workflows.studies.many.study_table import LIFE, Journal, StudyTable
+from tribodyn.workflows.studies.study_result import StudyResult
 
 COEFFICIENT = "wear.coefficient"
 BATCH = 8  # runs that are added at a time
 
 
 @dataclass(frozen=True, repr=False)
-class LifeDistribution(TableResult):
+class LifeDistribution(StudyResult):
     """A number as a distribution.
 
     table : of the full runs; runs : that have the number; open : of them, those with only a lower bound of it
@@ -43,7 +46,6 @@ class LifeDistribution(TableResult):
     model_error : relative, None where it is not known; model_error_of : where it is from, or why it is not known
     values, weights : (n,) in order: the expected distribution"""
 
-    stem = "lives"
     name: str
     number: str
     table: StudyTable
@@ -93,6 +95,17 @@ class LifeDistribution(TableResult):
         texts.append(f"scatter {scatter}; measured exactly, a key leaves of it (first and total Sobol index):")
         texts += [f"  {i.key:32}{100 * i.remaining:6.1f} %   ({i.first:.3f}, {i.total:.3f})" for i in self.influences]
         return self.table.troubles() + texts
+
+    @property
+    def defects(self) -> list[str]:
+        """Runs that a defect of the program stopped."""
+        return self.table.defects
+
+    @property
+    def files(self) -> list[Path]:
+        """What it left beside the study's tables."""
+        folder = self.table.folder
+        return [] if folder is None else [folder / "lives.json", folder / "lives.png"]
 
     def plot(self) -> Figure:
         """The distribution with its quantiles, and what it depends on."""
@@ -154,7 +167,8 @@ def _distribution(study: ParameterStudy, runner: Runner, rare: float | None) -> 
         write_figure(table.plot(), folder / "study.png")
     error, source = _model_error(study, middle, table, folder, runner.progress)
     distribution = _result(study, table, life_fit, sample, shares, error, source)
-    distribution.save(distribution.plot())
+    write_text(folder / "lives.json", json.dumps(distribution.record(), indent=2) + "\n")
+    write_figure(distribution.plot(), folder / "lives.png")
     return distribution
 
 

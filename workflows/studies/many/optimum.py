@@ -8,13 +8,17 @@ programming; sequential quadratic programming solves it on the processes, from t
 Source  SLSQP of SciPy: Kraft 1988; weights: Knowles 2006, doi 10.1109/TEVC.2005.851274; a process for every aim:
     Daulton, Balandat and Bakshy 2020"""
 
+import json
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from tribodyn.output_file import write_text
 from tribodyn.refusal import SolveFailed
+from tribodyn.workflows.pictures.figures import write_figure
 from tribodyn.workflows.pictures.matplotlib_names import Figure
 from tribodyn.workflows.run.progress import Report, reporter
 from tribodyn.workflows.scene.scene_file import AnyPath, SceneError
@@ -25,20 +29,20 @@ from tribodyn.workflows.studies.many.proposals import EvaluatedRuns, chebyshev, 
 from tribodyn.workflows.studies.many.run_task import RUN
 from tribodyn.workflows.studies.many.study_file import LISTED, Aim, ParameterStudy
 from tribodyn.workflows.studies.many.study_runs import Runner
-from tribodyn.workflows.studies.many.study_table import SENTENCE, StudyTable, TableResult
+from tribodyn.workflows.studies.many.study_table import SENTENCE, StudyTable
+from tribodyn.workflows.studies.study_result import StudyResult
 
 GAIN = 1e-3  # of an aim, of its logarithm where it is positive and of its range else, that one run more is worth
 
 
 @dataclass(frozen=True, repr=False)
-class Optimum(TableResult):
+class Optimum(StudyResult):
     """Result of an optimisation.
 
     table : of all runs; front : rows of the table that no other allowed one beats in all aims, by the first aim
     best : row of the one nearest to the best of every aim, each between its ends on the front; the best of one aim
     bounded : by aim, rows of which only a lower bound is known, such as lives that did not end"""
 
-    stem = "optimum"
     name: str
     aims: tuple[Aim, ...]
     table: StudyTable
@@ -81,12 +85,24 @@ class Optimum(TableResult):
         return self.table.troubles() + texts
 
     def _describe(self, row: int) -> str:
-        keys = ", ".join(f"{key} {_short(value)}" for key, value in self.keys(row).items())
+        at = self.keys(row).items()
+        keys = ", ".join(f"{key} {value:.4g}" if isinstance(value, float) else f"{key} {value}" for key, value in at)
         values = ", ".join(
             f"{number} {'at least ' if row in self.bounded[number] else ''}{value:.4g}"
             for number, value in self.values(row).items()
         )
         return f"run {self.table.columns[RUN][row]}: {values}   with {keys}"
+
+    @property
+    def defects(self) -> list[str]:
+        """Runs that a defect of the program stopped."""
+        return self.table.defects
+
+    @property
+    def files(self) -> list[Path]:
+        """What it left beside the study's tables."""
+        folder = self.table.folder
+        return [] if folder is None else [folder / "optimum.json", folder / "optimum.png"]
 
     def plot(self) -> Figure:
         """The trade of the first two aims, or how the one aim got better."""
@@ -145,7 +161,8 @@ def _search(study: ParameterStudy, runner: Runner) -> Optimum:
     best = int(front[chebyshev(evaluated.aims[front], np.ones(len(settings.aims)), low, high).argmin()])
     bounded = {aim.number: tuple(np.flatnonzero(table.values_of(aim.number)[1]).tolist()) for aim in settings.aims}
     optimum = Optimum(study.name, settings.aims, table, tuple(int(row) for row in front), best, bounded)
-    optimum.save(optimum.plot())
+    write_text(runner.folder / "optimum.json", json.dumps(optimum.record(), indent=2) + "\n")
+    write_figure(optimum.plot(), runner.folder / "optimum.png")
     return optimum
 
 
@@ -185,7 +202,3 @@ def _evaluate(study: ParameterStudy, space: ParameterSpace, table: StudyTable) -
     numbers, by = (np.stack(each, axis=1) for each in zip(*columns, strict=True))
     m = len(settings.aims)
     return EvaluatedRuns(space.shares(space.points_of(table.columns)), numbers[:, :m], numbers[:, m:], by)
-
-
-def _short(value: Any) -> str:
-    return f"{value:.4g}" if isinstance(value, (float, np.floating)) else str(value)

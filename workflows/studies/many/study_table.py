@@ -8,15 +8,14 @@ import os
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, ClassVar, get_args
+from typing import TYPE_CHECKING, Any, get_args
 
 import numpy as np
 from scipy import stats
 
 from tribodyn.hbm.quantity import StatedQuantity, names_with_error, quantities_of
-from tribodyn.output_file import cell, replacing, set_aside, write_text
+from tribodyn.output_file import cell, replacing, set_aside
 from tribodyn.refusal import Refusal
-from tribodyn.workflows.pictures.figures import write_figure
 from tribodyn.workflows.pictures.matplotlib_names import Figure
 from tribodyn.workflows.studies.many import study_pictures
 from tribodyn.workflows.studies.many.distributions import si
@@ -140,30 +139,6 @@ class StudyTable(StudyResult):
     def plot(self) -> Figure:
         """Response against each of the keys that vary, see `many.pictures`."""
         return study_pictures.panes(self)
-
-
-class TableResult(StudyResult):
-    """What a study makes of its table. stem : name of its files"""
-
-    stem: ClassVar[str]
-    table: StudyTable
-
-    @property
-    def defects(self) -> list[str]:
-        """Runs that a defect of the program stopped."""
-        return self.table.defects
-
-    @property
-    def files(self) -> list[Path]:
-        """Those beside the study's tables."""
-        folder = self.table.folder
-        return [] if folder is None else [folder / f"{self.stem}.json", folder / f"{self.stem}.png"]
-
-    def save(self, picture: Figure) -> None:
-        """Write them."""
-        record_file, picture_file = self.files
-        write_text(record_file, json.dumps(self.record(), indent=2) + "\n")
-        write_figure(picture, picture_file)
 
 
 def table(

@@ -23,7 +23,7 @@ from tribodyn.workflows.run import settings
 from tribodyn.workflows.run.settings import OUTPUT
 from tribodyn.workflows.scene.fields import unknown_key
 from tribodyn.workflows.scene.scene_file import SceneError, SceneFile
-from tribodyn.workflows.scene.wheel_scene import Mistuning
+from tribodyn.workflows.scene.wheel_tables import Mistuning
 from tribodyn.workflows.studies.wheels import wheel_model as wheels
 
 SHORTEST, LONGEST = 1e-4, 0.15  # steps of a scan, of its range: beyond a jump it continues

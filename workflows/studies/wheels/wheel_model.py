@@ -22,7 +22,8 @@ from tribodyn.workflows.run import joints, modelling, sector as sectors
 from tribodyn.workflows.run.progress import Progress
 from tribodyn.workflows.scene.scene_file import SceneError, SceneFile
 from tribodyn.workflows.scene.schema import MeshScene, has_wheel
-from tribodyn.workflows.scene.wheel_scene import WheelScene, WheelTable
+from tribodyn.workflows.scene.wheel_scene import WheelScene
+from tribodyn.workflows.scene.wheel_tables import WheelTable
 
 MAX_POINTS = 1000  # of a response
 
