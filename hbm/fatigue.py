@@ -216,10 +216,9 @@ def equivalent_amplitude(coefficients: np.ndarray, basis: HarmonicBasis, samples
     Under proportional loads it is the octahedral shear amplitude as a stress in tension. The stress of von Mises with a
     sign does not serve: in reversed torsion its sign is arbitrary and halves the amplitude"""
     stress = over_cycle(coefficients, basis, samples)
-    deviator = np.concatenate(
-        [(stress[..., :3] - stress[..., :3].mean(axis=-1, keepdims=True)) * np.sqrt(1.5), stress[..., 3:] * np.sqrt(3)],
-        axis=-1,
-    )  # whose length is the stress of von Mises
+    normal = (stress[..., :3] - stress[..., :3].mean(axis=-1, keepdims=True)) * np.sqrt(1.5)
+    # whose length is the stress of von Mises
+    deviator = np.concatenate([normal, stress[..., 3:] * np.sqrt(3)], axis=-1)
     squares = (deviator**2).sum(axis=-1)
     products = deviator @ np.swapaxes(deviator, -1, -2)
     largest = (squares[..., :, None] + squares[..., None, :] - 2 * products).max(axis=(-1, -2))

@@ -13,9 +13,8 @@ from tribodyn.hbm.linear.linear_side import LinearSide
 
 NEARLY_ALL = 0.03  # share of the flexibility that products may leave out and still find Newton's directions alone
 INNER, INNER_PRODUCTS = 0.05, 60  # residual and products of a direction within a direction, where they leave out more
-Remainder = (
-    Callable[[np.ndarray], np.ndarray] | None
-)  # (n_contact, n_coeff) departures g [N] -> contact displacement [m]
+Remainder = Callable[[np.ndarray], np.ndarray] | None
+"""(n_contact, n_coeff) departures g [N] -> contact displacement [m]."""
 
 
 class Linearisation:
@@ -183,7 +182,7 @@ class Linearisation:
             cosine, sine = (
                 displacement[:, s::2],
                 displacement[:, s + 1 :: 2],
-            )  # a unit of sine moves by -sine and cosine
+            )  # sine moves by -sine, cosine
             block = columns[:, :, row // n_comp]
             block[:, :s] -= displacement[:, :s] * pushed[:s]
             block[:, s::2] -= cosine * pushed[s::2] - sine * pushed[s + 1 :: 2]

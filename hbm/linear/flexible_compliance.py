@@ -52,11 +52,8 @@ class RitzExpansion(Expansion):
         self.b_single = self.b[: len(b)].astype(np.float32)
         self.w0, self.order, self.n_mode = None, 1, len(self.lam)  # type: ignore[assignment]
         self.w0_single = np.zeros((0, 0), np.float32)
-        self.to_ports, self.single, self.unit = (
-            np.ascontiguousarray(self.b.T),
-            np.zeros((len(ports), 0), np.float32),
-            1.0,
-        )
+        self.to_ports, self.unit = np.ascontiguousarray(self.b.T), 1.0
+        self.single = np.zeros((len(ports), 0), np.float32)
         self.e, self.e_in, self.higher, self.t = [], [], [], np.zeros((0, 0, 0))
         self.error = residual.error(s_max)
 

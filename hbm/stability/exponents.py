@@ -174,9 +174,8 @@ def _hill(balance: HarmonicBalance, state: State, n_modes: int | None, top: int 
     if answer is not None:
         flow = np.zeros((m, m)) if expansion.flow is None else expansion.flow[:m, :m]
         modes = expansion.lam[:m], expansion.c[:m, :m], flow, phi, static
-        distinct, of = np.unique(
-            np.where(exponents.imag < 0, exponents.conj(), exponents), return_inverse=True
-        )  # each with its conjugate
+        # each with its conjugate
+        distinct, of = np.unique(np.where(exponents.imag < 0, exponents.conj(), exponents), return_inverse=True)
         distinct = hill_problem.refined(distinct, (lambda index: modes, 0, 0, state.omega), slope, answer)[of]
         exponents = np.where(exponents.imag < 0, distinct.conj(), distinct)
     return exponents * state.omega

@@ -170,9 +170,8 @@ def monodromy(stepper: TimeStepper, slopes: np.ndarray | None) -> np.ndarray:
     z, f, x, s = np.split(np.eye(n + 2 * n_contact + n_memory), np.cumsum([n, n_contact, n_contact]))
     for D in slopes:
         free = linear.E @ z - 0.5 * linear.Q @ (linear.U.T @ f)
-        of_x, of_s, of_x0 = (
-            _block_diagonal(part) for part in np.split(D, [c, c + n_state], axis=2)
-        )  # each of (f, memory), pair by pair
+        # each of (f, memory), pair by pair
+        of_x, of_s, of_x0 = map(_block_diagonal, np.split(D, [c, c + n_state], axis=2))
         free_part = of_s @ s + of_x0 @ x
         force = np.arange(len(of_x)).reshape(-1, c + n_state)[:, :c].ravel()
         x_free = linear.U @ free[: n // 2] - A @ free_part[force]

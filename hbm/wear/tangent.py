@@ -152,9 +152,8 @@ class Tangent:
         stride = row.cycles_in_step
         if self.scheme == StepScheme.EXPLICIT:
             return depth + stride * self.moved(before, depth, 0.0)[1]
-        drift, slopes = initial_guess(
-            self.problem, before, earlier, self.problem
-        )  # the first stage again, as the run came to it
+        # the first stage again, as the run came to it
+        drift, slopes = initial_guess(self.problem, before, earlier, self.problem)
         searches = [FrequencySearch(float(slope)) for slope in slopes]
         reach, middle = GAMMA * stride, solve_first_stage(self.problem, before, stride, drift, searches)
         rate = (row.worn / stride - GAMMA * after.rate) / (1 - GAMMA)

@@ -12,11 +12,8 @@ from tribodyn.output_file import cell, replacing
 PREFIXES = {9: "G", 6: "M", 3: "k", 0: "", -3: "m", -6: "µ", -9: "n"}
 COUNTED = {9: " billion", 6: " million", 0: ""}
 BLOCKS = "▁▂▃▄▅▆▇█"
-UNKNOWN, DEFAULT_DIGITS, LARGEST_DIGITS = (
-    2,
-    3,
-    6,
-)  # digits of a value whose error was looked for in vain, of one without, at the most
+# digits of a value whose error was looked for in vain, of one without, at the most
+UNKNOWN, DEFAULT_DIGITS, LARGEST_DIGITS = 2, 3, 6
 
 
 def write_columns(columns: Mapping[str, Any], path: Path) -> None:

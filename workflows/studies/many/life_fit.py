@@ -90,9 +90,8 @@ class LifeFit:
         the surrogate is smooth, and a part that survives is not a part that lives a little longer"""
         if not self.open:
             return False
-        share_open = stats.beta.ppf(
-            0.5 + confidence / 2, self.open + 1, self.runs - self.open
-        )  # Clopper and Pearson 1934
+        # Clopper and Pearson 1934
+        share_open = stats.beta.ppf(0.5 + confidence / 2, self.open + 1, self.runs - self.open)
         return bool(high >= self.bound or share >= 1 - share_open)
 
     @classmethod

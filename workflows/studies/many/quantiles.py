@@ -161,13 +161,9 @@ def influences(space: ParameterSpace, mean: Callable[[np.ndarray], np.ndarray], 
     else:
         first, total = np.empty(k), np.empty(k)
         for i, key in enumerate(space.keys):
-            remaining = [other for other in space.keys if other != key]
-            first[i] = _indices(_ordered(space, [key, *remaining]), _as_before(space, mean, [key, *remaining]), seed)[
-                0
-            ][0]
-            total[i] = _indices(_ordered(space, [*remaining, key]), _as_before(space, mean, [*remaining, key]), seed)[
-                1
-            ][-1]
+            others = [other for other in space.keys if other != key]
+            first[i] = _indices_in_order(space, mean, [key, *others], seed)[0][0]
+            total[i] = _indices_in_order(space, mean, [*others, key], seed)[1][-1]
     indices = [Influence(key, float(a), float(b)) for key, a, b in zip(space.keys, first, total, strict=True)]
     return tuple(sorted(indices, key=lambda influence: -influence.first))
 
@@ -187,14 +183,10 @@ def _indices(
     return np.clip(indices.first_order.ravel(), 0, 1), np.clip(indices.total_order.ravel(), 0, 1)
 
 
-def _ordered(space: ParameterSpace, keys: list[str]) -> ParameterSpace:
-    study = space.study
-    return ParameterSpace(replace(study, varied={key: study.varied[key] for key in keys}))
-
-
-def _as_before(
-    space: ParameterSpace, mean: Callable[[np.ndarray], np.ndarray], keys: list[str]
-) -> Callable[[np.ndarray], np.ndarray]:
-    """The function of coordinates in another order of the keys."""
+def _indices_in_order(
+    space: ParameterSpace, mean: Callable[[np.ndarray], np.ndarray], keys: list[str], seed: int
+) -> tuple[np.ndarray, np.ndarray]:
+    """The same of the keys in another order."""
     back = [keys.index(key) for key in space.keys]
-    return lambda coordinates: mean(coordinates[:, back])
+    ordered = ParameterSpace(replace(space.study, varied={key: space.study.varied[key] for key in keys}))
+    return _indices(ordered, lambda coordinates: mean(coordinates[:, back]), seed)
