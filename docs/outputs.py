@@ -20,8 +20,8 @@ from typing import Any
 from filelock import FileLock
 
 FOLLOWED = (
-    "tutorials/first_run", "tutorials/own_law", "tutorials/own_part", "tutorials/own_matrices", "tutorials/does_it_break",
-    "howto/deck", "howto/step", "howto/inspect",
+    "tutorials/first_run", "tutorials/own_law", "tutorials/own_part", "tutorials/own_matrices",
+    "tutorials/does_it_break", "howto/deck", "howto/step", "howto/inspect",
 )  # fmt: skip
 FENCE = re.compile(r"^```([a-z]+)(?: ([\w.]+))?\n(.*?)^```\n", re.M | re.S)
 FIRST = "./tribodyn run vane"
