@@ -90,10 +90,7 @@ def euclidean_norm(values: np.ndarray) -> float:
 
 
 def required_residual(
-    balance: Balance[Frequency, Evaluated],
-    state: Evaluated,
-    x_lin: np.ndarray,
-    options: NewtonOptions,
+    balance: Balance[Frequency, Evaluated], state: Evaluated, x_lin: np.ndarray, options: NewtonOptions
 ) -> float:
     """The relative residual to reach: the tolerance, or less where contact forces or the vibration need it and rounding
     permits."""

@@ -58,15 +58,8 @@ class MistunedWheel:
     @cached_property
     def nominal(self) -> NominalWheel:
         """The linear side of sectors nominal, made once."""
-        sector_balance = self.wave
-        return NominalWheel(
-            self.model,
-            sector_balance.contact.stiffness,
-            sector_balance.basis,
-            sector_balance.excitation,
-            sector_balance.omega_max,
-            self.ports,
-        )
+        wave = self.wave
+        return NominalWheel(self.model, wave.contact.stiffness, wave.basis, wave.excitation, wave.omega_max, self.ports)
 
     @cached_property
     def _model(self) -> MistunedModel:
@@ -74,38 +67,26 @@ class MistunedWheel:
         i = wave.interface
         faces = np.concatenate([i.faces + k * i.n_pair for k in range(n)])
         all_pairs = replace(
-            i,
-            points=np.tile(i.points, (n, 1)),
-            frames=np.tile(i.frames, (n, 1, 1)),
-            area=np.tile(i.area, n),
-            gap=np.tile(i.gap, n),
-            B=np.tile(np.asarray(i.B), (n, 1)),
-            faces=faces,
-        )
+            i, points=np.tile(i.points, (n, 1)), frames=np.tile(i.frames, (n, 1, 1)), area=np.tile(i.area, n),
+            gap=np.tile(i.gap, n), B=np.tile(np.asarray(i.B), (n, 1)), faces=faces,
+        )  # fmt: skip
         return MistunedModel(wave.system, all_pairs, wave.origin, free_frequency=wave.free_frequency)
 
     def balance(self, deviation: np.ndarray, change: Change | None = None) -> HarmonicBalance:
         """The wheel with relative deviations (N,) of stiffness, and contacts that are the sector's or changed ones.
 
         Raises  Refusal for deviations that cannot be"""
-        sector_balance = self.wave
+        wave = self.wave
         # to a balance it is what a ContactCompliance is; what needs matrices of a harmonic is refused by the model
-        compliance = cast(ContactCompliance, MistunedCompliance(self.nominal, sector_balance.basis, deviation))
-        joints = sector_balance.contact.repeat(self.n_sectors)
+        compliance = cast(ContactCompliance, MistunedCompliance(self.nominal, wave.basis, deviation))
+        joints = wave.contact.repeat(self.n_sectors)
         if change is not None:
-            size = sector_balance.contact.n_pair
+            size = wave.contact.n_pair
             joints = tuple(change(joint, joint.rows // size) for joint in joints)
         contact = JointSet.of(self._model, joints)
-        memory = np.tile(sector_balance.memory, (self.n_sectors, 1))
-        at_rest = None if sector_balance.at_rest is None else np.tile(sector_balance.at_rest, (self.n_sectors, 1))
+        memory = np.tile(wave.memory, (self.n_sectors, 1))
+        at_rest = None if wave.at_rest is None else np.tile(wave.at_rest, (self.n_sectors, 1))
         return HarmonicBalance(
-            self._model,
-            contact,
-            sector_balance.basis,
-            sector_balance.excitation,
-            sector_balance.omega_max,
-            memory,
-            compliance,
-            sector_balance.load_factor,
+            self._model, contact, wave.basis, wave.excitation, wave.omega_max, memory, compliance, wave.load_factor,
             at_rest,
-        )
+        )  # fmt: skip

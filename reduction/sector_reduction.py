@@ -93,16 +93,19 @@ def distinct(sector: Sector) -> tuple[Sector, np.ndarray]:
     right, left_rows = np.asarray(sector.interface.B), np.asarray(sector.left_map)
     is_equal = (right @ right.T >= 1 - LIMITS.rounding) & (left_rows @ left_rows.T >= 1 - LIMITS.rounding)
     is_equal[np.arange(len(right)), np.arange(len(right))] = True
-    first, of_row = np.unique(is_equal.argmax(axis=1), return_inverse=True)
+    first, of_row = np.unique(np.array([row.argmax() for row in is_equal], int), return_inverse=True)
     unique_rows = replace(sector, interface=replace(sector.interface, B=right[first]), left_map=left_rows[first])
     return unique_rows, of_row
 
 
 def node_to_node(sector: Sector) -> bool:
-    """Whether every contact is one of the neighbours' nodes, each in one pair, as `relative_map` needs it."""
+    """Whether every contact, one at least, is one of the neighbours' nodes, each in one pair: for `relative_map`."""
     right, left_rows = np.asarray(sector.interface.B), np.asarray(sector.left_map)
     between = np.abs(left_rows).max(axis=1, initial=0.0) > 0
-    return bool(between.all()) and np.abs(right @ right.T - np.eye(len(right))).max(initial=0.0) <= LIMITS.rounding
+    return (
+        bool(len(right) and between.all())
+        and np.abs(right @ right.T - np.eye(len(right))).max(initial=0.0) <= LIMITS.rounding
+    )
 
 
 def relative_map(sector: Sector, index: int) -> tuple[np.ndarray, int]:

@@ -18,6 +18,7 @@ import scipy.linalg as sla
 
 from tribodyn.hbm import newton
 from tribodyn.hbm.balance import HarmonicBalance, State
+from tribodyn.hbm.linear.compliance import ContactCompliance
 from tribodyn.hbm.linear.expansion import SingularStuckSystem
 from tribodyn.hbm.linear.linear_side import compliance_of
 from tribodyn.hbm.newton import NewtonOptions, Solution, lead
@@ -60,8 +61,8 @@ RULES = StiffeningRules()
 @single
 def solve_along_stiffness(balance: HarmonicBalance, omega: float, options: NewtonOptions) -> Solution | None:
     """A solution at one frequency [rad/s], None where there is no way to it or the dense Jacobian is too large."""
-    if balance.n_unknown > newton.RULES.most_dense:
-        return None
+    if balance.n_unknown > newton.RULES.most_dense or not isinstance(balance.compliance, ContactCompliance):
+        return None  # the compliance of a wheel whose sectors differ is one of its own springs
     spent, soft = 0, None
     hasty = replace(options, max_steps=min(options.max_steps, RULES.hasty))
     path: list[tuple[float, np.ndarray]] = []  # levels and solutions of the way so far

@@ -197,8 +197,7 @@ class TimeStepper:
         )
         pull += k * (self.static @ state.cycle.force.reshape(len(k), -1)[:, 0])
         solution: np.ndarray = np.linalg.solve(
-            np.diag(self.lam) + self.flow + U.T @ (k[:, None] * U),
-            self._modal_load[:, 0] + modal @ hold + U.T @ pull,
+            np.diag(self.lam) + self.flow + U.T @ (k[:, None] * U), self._modal_load[:, 0] + modal @ hold + U.T @ pull
         )
         return solution
 

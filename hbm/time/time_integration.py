@@ -220,11 +220,7 @@ def _to_periodic(stepper: TimeStepper, motion: Moving, options: Options, with_sl
 
 
 def motion_of(
-    stepper: TimeStepper,
-    period: Period,
-    periods: int,
-    outcome: Outcome[SolveEnd],
-    start: Moving | None = None,
+    stepper: TimeStepper, period: Period, periods: int, outcome: Outcome[SolveEnd], start: Moving | None = None
 ) -> PeriodicMotion:
     """What one marched period shows.
 

@@ -13,10 +13,7 @@ ENDLESS = 1e12  # cycles: thirty years at 1 kHz, longer than any machine runs
 
 
 def reason_to_stop(
-    problem: WearProblem,
-    state: WearState,
-    rows: Sequence[WearRow] = (),
-    step_depth: float = 0.0,
+    problem: WearProblem, state: WearState, rows: Sequence[WearRow] = (), step_depth: float = 0.0
 ) -> Outcome[WearEnd] | None:
     """Why a run ends at a state; None where it continues.
 

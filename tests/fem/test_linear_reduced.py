@@ -6,11 +6,13 @@ import numpy as np
 import pytest
 import skfem
 
+from tribodyn.fem.assembly import Body
 from tribodyn.fem.elasticity import FORMULATIONS, assemble
 from tribodyn.fem.elements import coordinates
 from tribodyn.fem.load_vectors import Heating
 from tribodyn.fem.material import Material, Orthotropic
 from tribodyn.fem.prestress import geometric_stiffness
+from tribodyn.workflows.run.sanity_checks import check_thickness
 
 SOFT = Orthotropic((140e9, 9e9, 10e9), (0.3, 0.28, 0.4), (5e9, 4.5e9, 3.5e9), 1600.0)
 REDUCED = Material(E=210e9, nu=0.3, rho=7860.0, elements="linear_reduced")
@@ -35,6 +37,12 @@ def test_every_formulation_of_eight_nodes_has_rigid_motions_and_uniform_strains(
             assert np.abs(force[inner]).max() < 1e-12 * abs(K).max()
         assert np.linalg.eigvalsh(K.toarray())[6] > 1e-6 * abs(K).max()
         assert M.sum() == pytest.approx(3 * material.rho * 0.35)
+
+
+def test_a_body_one_element_thick_is_remarked():
+    for planes, count in ((2, 1), (3, 0)):
+        body = Body("plate", skfem.MeshHex.init_tensor(*map(np.arange, (5, 3, planes))), {}, REDUCED)
+        assert sum("hourglass" in text for text in check_thickness([body])) == count
 
 
 def test_eight_node_hexahedra_are_those_on_the_nodes_of_a_27_node_mesh():

@@ -113,10 +113,7 @@ def test_places_have_the_stress_of_the_field(run: td.Result, path: Path) -> None
     np.testing.assert_allclose(strain, expected, atol=0.03 * np.abs(expected).max())
 
 
-@pytest.mark.parametrize(
-    ("change", "off"),
-    [("method=residual_flexibility", 2e-3), ("interface_modes=60", 0.05)],
-)
+@pytest.mark.parametrize(("change", "off"), [("method=residual_flexibility", 2e-3), ("interface_modes=60", 0.05)])
 def test_other_reductions_have_the_same_stress(run: td.Result, path: Path, change: str, off: float) -> None:
     """That of the contact DOFs as they are, though a pair lies on the clamp and has no traction."""
     best = int(np.argmax(run.response.height("response")))

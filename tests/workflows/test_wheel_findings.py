@@ -11,10 +11,11 @@ from tests.helpers.wheel_scene import WHEEL
 from tribodyn.hbm.balance import HarmonicBalance, State
 from tribodyn.hbm.contact import aft
 from tribodyn.hbm.continuation.methods import arc_length, natural
-from tribodyn.workflows.run import modelling, sanity_checks
+from tribodyn.workflows.run import modelling, sanity_checks, sector
 from tribodyn.workflows.run.progress import Progress
 from tribodyn.workflows.scene import scene_file
 from tribodyn.workflows.studies.many.run_task import numbers_of
+from tribodyn.workflows.studies.wheels import wheel_model as wheels
 
 QUICK = ("verdict.enabled=false", 'damping.modal="0.5 %"')
 FIVE = WHEEL.replace("n_blades = 6", "n_blades = 5").replace("sectors = 6", "sectors = 5")
@@ -38,19 +39,28 @@ def test_the_peak_that_a_study_reads_does_not_hang_on_the_scan(tmp_path: Path, s
     assert not any(row["peak_at_end"] for row in rows)
 
 
+def test_a_wheel_without_a_contact_is_one_whose_contact_is_open(tmp_path: Path) -> None:
+    texts = WHEEL[: WHEEL.index("[contact]")] + WHEEL[WHEEL.index("[loads.h") :], WHEEL.replace("-0.1 mm", "1 mm")
+    files = (scene_file.parse(text, "w.toml", ("wheel.speed=6000 rpm",), Path()) for text in texts)
+    alone, opened = map(wheels.build, files)
+    assert alone.diagram([0, 2], 3, False, True) == pytest.approx(opened.diagram([0, 2], 3, False, True), rel=1e-7)
+    assert of(tmp_path, wheel=texts[0]).response.converged.all()
+    table = opened.table.model_copy(update={"seam": ("cyclic_left", "cyclic_right")})
+    with pytest.raises(ValueError, match="swap the two faces"):  # of a part that is made already
+        sector.sector(opened.scene.model_copy(update={"wheel": table}), opened.part)
+
+
 def test_a_wheel_without_damping_is_warned_of() -> None:
-    without = WHEEL.replace('[damping]\nmodal = "2 %"\n', "")
-    for text, warned in ((WHEEL, False), (without, True)):
+    for text, warned in ((WHEEL, False), (WHEEL.replace('[damping]\nmodal = "2 %"\n', ""), True)):
         file = scene_file.parse(text, "w.toml", (), Path())
-        items = list(sanity_checks.remarks(file, modelling.build(file, Progress())))
-        assert any("no damping but that of friction" in line for line in items) is warned
+        items = " ".join(sanity_checks.remarks(file, modelling.build(file, Progress())))
+        assert ("no damping but that of friction" in items) is warned
 
 
 @pytest.mark.parametrize(("law", "most"), [("jenkins", np.sqrt(2)), ("coulomb_planar", 1.0)])
 def test_the_resultant_of_friction_on_a_shroud(law: str, most: float) -> None:
     """Over mu N: uncoupled sliders come to the square root of two, planar friction to one; both near the resonance."""
-    requested = (f'contact.law="{law}"', *SLIPPING, "loads.harmonic.wave.value='20 N'", "harmonics.samples=128")
-    b = modelling.build(scene_file.parse(WHEEL, "w.toml", requested, Path()), Progress()).balance
+    b = slipping(law)
     solved = arc_length.solve_along_load(b, 2 * np.pi * 640.0)
     assert solved.converged
     (joint,) = b.contact.joints
@@ -58,15 +68,14 @@ def test_the_resultant_of_friction_on_a_shroud(law: str, most: float) -> None:
     assert np.max(np.hypot(force[:, 0], force[:, 1]) / (0.3 * force[:, 2])) == pytest.approx(most, rel=1e-3)
 
 
-def planar() -> HarmonicBalance:
-    requested = ('contact.law="coulomb_planar"', *SLIPPING, "loads.harmonic.wave.value='20 N'", "harmonics.samples=128")
+def slipping(law: str = "coulomb_planar") -> HarmonicBalance:
+    requested = (f'contact.law="{law}"', *SLIPPING, "loads.harmonic.wave.value='20 N'", "harmonics.samples=128")
     return modelling.build(scene_file.parse(WHEEL, "w.toml", requested, Path()), Progress()).balance
 
 
 def test_planar_friction_behind_a_jump_begins_with_uncoupled_sliders(monkeypatch: pytest.MonkeyPatch) -> None:
     """Its own curve over the load has a corner wherever a pair can just stick: 8467 evaluations, and no end of it."""
-    b, laws = planar(), []
-    evaluate = HarmonicBalance.evaluate
+    b, laws, evaluate = slipping(), [], HarmonicBalance.evaluate
 
     def counted(self: HarmonicBalance, *arguments: Any, **named: Any) -> State:
         laws.append(self.contact.joints[0].law)
@@ -81,6 +90,6 @@ def test_planar_friction_behind_a_jump_begins_with_uncoupled_sliders(monkeypatch
 @pytest.mark.slow
 def test_a_scan_with_planar_friction_solves_every_frequency() -> None:
     """Through two jumps, at 597.2 and 602 Hz; the second needs springs that stiffen."""
-    branch = natural.follow(planar(), 2 * np.pi * 560, 2 * np.pi * 680, natural.Options(n_points=30))
+    branch = natural.follow(slipping(), 2 * np.pi * 560, 2 * np.pi * 680, natural.Options(n_points=30))
     assert branch.arrived
     assert branch.converged.all()

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from itertools import combinations
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -85,6 +86,7 @@ def remarks_on_part(file: SceneFile, part: Part) -> list[str]:
     scene = file.mesh_scene
     doubts = [*unusual_values(scene), *check_size(np.ptp(part.points, axis=0), "scale the mesh to metres")]
     doubts += [*check_decks(file, part), *check_places(scene), *check_heat(scene, part)]
+    doubts += check_thickness(part.mesh.bodies)
     if scene.bolts:
         from tribodyn.workflows.run import bolt_tightening  # only bolts need it
 
@@ -221,6 +223,22 @@ def check_materials(bodies: Iterable[Body]) -> list[str]:
         for remark in usual.remarks(f"{key} of body '{body.name}'", getattr(material, attribute, None))
     ]
     return list(dict.fromkeys(remarks))
+
+
+def check_thickness(bodies: Iterable[Body]) -> list[str]:
+    """Remarks on bodies of linear_reduced elements that are one element thick, where little resists their bending."""
+    remarks = []
+    for body in (b for b in bodies if any(material.elements == "linear_reduced" for material in materials_in(b))):
+        mesh, sides = body.mesh, [set(side) for side in body.mesh.elem.refdom.facets]
+        opposite = [pair for pair in combinations(range(6), 2) if not sides[pair[0]] & sides[pair[1]]]
+        thin = (mesh.f2t[1][mesh.t2f[np.array(opposite)]] < 0).all(axis=1).any(axis=0).sum()
+        share = "hourglass stiffness alone" if mesh.doflocs.shape[1] == mesh.nvertices else "three quarters of it"
+        if thin:
+            remarks.append(
+                f"body '{body.name}' is one element thick at {thin} of {mesh.nelements}; of the bending stiffness "
+                f"of linear_reduced elements {share} acts: mesh it finer there or with other elements"
+            )
+    return remarks
 
 
 def check_speed(scene: MeshScene, line_error: float | None) -> list[str]:

@@ -55,7 +55,11 @@ def sector(scene: WheelScene, part: Part) -> Sector:
             f"wheel.seam is missing, but the part has {right} and {left_face}, where its disk would be cut open: "
             f'give wheel.seam = ["{right}", "{left_face}"]'
         )
-    cut = cyclic_symmetry.cut_sector(part, part_reduction.contacts(scene), wheel.sectors, wheel.seam, wheel.axis)
+    try:
+        cut = cyclic_symmetry.cut_sector(part, part_reduction.contacts(scene), wheel.sectors, wheel.seam, wheel.axis)
+    except Refusal:
+        check_faces(scene, part.mesh, part.node_sets)  # the part may be that of a scene with another seam
+        raise
     if not wheel.speed:
         return cut
     try:
@@ -193,6 +197,8 @@ def static_displacement(scene: MeshScene, sector: Sector, tolerance: float = 1e-
     The sector is reduced here with residual flexibility, one contact traction per pair. This is exact for statics: it
     needs no masters on the contact, and none on the seams because all sectors move alike.
     tolerance : of the static balance; samples : time samples of the cycle, in which nothing moves"""
+    if not sector.interface.n_pair:
+        return stuck_displacement(scene, sector)
     system, B = wave_system(sector, 0)
     static = static_loads(scene)
     static_system = replace(system, gyroscopic=None, loads={name: system.loads[name] for name in static}, outputs={})

@@ -142,12 +142,7 @@ def draw(
 
 @asks_consent
 def export(
-    result: ResultSource,
-    to: Sequence[str],
-    folder: AnyPath,
-    mesh_ending: str = ".xdmf",
-    *,
-    allow_scripts: bool = False,
+    result: ResultSource, to: Sequence[str], folder: AnyPath, mesh_ending: str = ".xdmf", *, allow_scripts: bool = False
 ) -> list[Path]:
     """Write a result in the formats of other programs, each into a folder of its name; the files written.
 

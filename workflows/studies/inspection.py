@@ -183,6 +183,7 @@ def _of_file(
                 )
     hint = 'give --unit mm (in a scene: unit = "mm")'
     remarks += [*sanity_checks.check_size(inspection.size, hint), *sanity_checks.check_materials(solids)]
+    remarks += sanity_checks.check_thickness(solids)
     remarks += scene_assembly.overlaps(solids)
     if not free:
         remarks += sanity_checks.check_modes(inspection.frequencies)
@@ -258,6 +259,10 @@ def _of_scene(file: scene_file.SceneFile, n_modes: int, progress: Progress) -> I
         with progress.stage("modes"):
             frequencies = _frequencies(part.system.mass, part.system.stiffness, n_modes)
         remarks = (*inspection.remarks, *sanity_checks.check_modes(frequencies))
+        if file.mesh_scene.wheel is not None and file.mesh_scene.wheel.speed:
+            remarks += (
+                "modes are those of the sector alone at rest: wheel modes has those of the wheel at wheel.speed",
+            )
         inspection = replace(inspection, frequencies=frequencies, remarks=remarks)
     return inspection
 

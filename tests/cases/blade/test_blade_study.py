@@ -114,8 +114,3 @@ def test_mistuned_wheel(tmp_path, capsys):
     assert_not_blank(tmp_path / "mistuned.png")
     amplification = float(message.split(": ")[1])
     assert 1.1 < amplification < 0.5 * (1 + np.sqrt(8)) * 1.2  # Whitehead's bound for a linear wheel, and some slack
-
-
-def test_a_part_alone_has_no_such_study():
-    with pytest.raises(ValueError, match=r"beam has no \[wheel\]"):
-        build(scene_file.read("beam"))

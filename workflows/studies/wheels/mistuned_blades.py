@@ -114,13 +114,9 @@ class MistunedBlades:
         balance, names = self.balance(pattern), [f"{OUTPUT}@{n}" for n in range(self.wheel.n_sectors)]
         low, high = settings.response_range(scene)
         scan = adaptive.Options(
-            tolerance=asked_of(self.file).tolerance,
-            step=0.02,
-            max_step=LONGEST,
-            min_step=SHORTEST,
-            newton=settings.newton_options(scene),
-            guess=self.ends[0],
-        )
+            tolerance=asked_of(self.file).tolerance, step=0.02, max_step=LONGEST, min_step=SHORTEST,
+            newton=settings.newton_options(scene), guess=self.ends[0],
+        )  # fmt: skip
 
         def tall(branch: Branch) -> np.ndarray:
             return np.column_stack([branch.amplitude(name) for name in names])

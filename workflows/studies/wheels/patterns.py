@@ -191,8 +191,8 @@ def patterns(
     names = ("amplification", "amplitude", "peak_frequency", "blade", "solves")
     columns = {name: [row.numbers.get(name, np.nan) for row in result.rows] for name in names}
     runs = {"pattern": [row.run for row in result.rows], "status": [row.status for row in result.rows]}
-    seconds = [row.seconds for row in result.rows]
-    write_columns({**runs, **columns, "seconds": seconds}, folder / "patterns.csv")
+    ends = {"seconds": [row.seconds for row in result.rows], "cause": [row.sentence for row in result.rows]}
+    write_columns({**runs, **columns, **ends}, folder / "patterns.csv")
     if result.complete:
         write_figure(result.plot(), folder / "mistuning.png")
     return result

@@ -9,7 +9,9 @@ from pathlib import Path
 from time import process_time
 from typing import Annotated
 
+import matplotlib as mpl
 import numpy as np
+from matplotlib.figure import Figure
 
 from tribodyn.fem.cyclic_symmetry import sector_maps
 from tribodyn.hbm.balance import HarmonicBalance
@@ -20,7 +22,6 @@ from tribodyn.hbm.threads import limited
 from tribodyn.reduction.linear_damping import modal_damping_towards
 from tribodyn.refusal import Refusal
 from tribodyn.workflows.pictures.figures import axes_of, length_unit
-from tribodyn.workflows.pictures.matplotlib_names import Figure, mpl
 from tribodyn.workflows.pictures.theme import INK, WEAR_MAP
 from tribodyn.workflows.run.settings import OUTPUT
 from tribodyn.workflows.scene.fields import Number, quantity
@@ -48,9 +49,11 @@ class MistunedSectors(StudyResult):
     peak: ResponseDerivatives | NoDerivative
 
     @property
-    def amplification(self) -> float:
-        """Largest amplitude of any sector over that of a wheel of sectors alike."""
-        return float(self.heights.max() / self.tuned.amplitude(OUTPUT).max())
+    def amplification(self) -> float | None:
+        """Largest amplitude of any sector over that of sectors alike; None without a peak of both in the range."""
+        curves = self.heights.max(axis=1), self.tuned.amplitude(OUTPUT)
+        has_peaks = all(0 < curve.argmax() < len(curve) - 1 for curve in curves)
+        return float(curves[0].max() / curves[1].max()) if has_peaks else None
 
     def record(self) -> dict[str, object]:
         """For machines."""
@@ -66,9 +69,11 @@ class MistunedSectors(StudyResult):
 
     def lines(self) -> list[str]:
         """For people."""
+        ratio = self.amplification
         lines = [
             "factors on the stiffness: " + ", ".join(f"{factor:.4f}" for factor in self.stiffness),
-            f"largest amplitude over that of sectors alike: {self.amplification:.3f}",
+            "largest amplitude over that of sectors alike: "
+            + ("not known, a response is highest at an end of its range" if ratio is None else f"{ratio:.3f}"),
         ]
         if isinstance(self.peak, NoDerivative):
             return [*lines, f"it has no derivatives by the factors: {self.peak}"]

@@ -129,12 +129,12 @@ def modes(
     formats : formats of the pictures, png, pdf or svg; can be repeated
     Raises  SceneError for a scene without a wheel; Refusal for what cannot be"""
     slow, fast = start, stop
-    if slow is not None and fast is None:
-        raise Refusal("--from: give --to, the highest speed, too")
     if families < 1:
         raise Refusal(f"--families {families}: ask for 1 at least")
-    if fast is not None and (fast <= 0 or (slow is not None and not 0 < slow < fast)):
-        raise Refusal("--from and --to: give speeds above 0, the lower one first")
+    if (slow is not None and fast is None) or (
+        fast is not None and not (fast > 0 and (slow is None or 0 < slow < fast))
+    ):
+        raise Refusal("--from and --to: give speeds above 0, the lower one first, the highest one in any case")
     if speeds < 2:
         raise Refusal(f"--speeds {speeds}: a Campbell diagram needs 2 at least")
     if 0 in orders:
@@ -143,12 +143,12 @@ def modes(
     with limited(file.scene.solver.threads):
         wheel = build(file)
         diameters = range(wheel.n_sectors // 2 + 1)
-        diagrams = {state: wheel.diagram(diameters, families, state == "stuck") for state in ("free", "stuck")}
-        if turns := wheel.full.system.gyroscopic is not None:
-            back = [-d for d in diameters]
-            diagrams |= {
-                state + AGAINST: wheel.diagram(back, families, state == "stuck") for state in ("free", "stuck")
-            }
+        turns = wheel.full.system.gyroscopic is not None
+        diagrams = {
+            state + way: wheel.diagram([sign * d for d in diameters], families, state == "stuck")
+            for way, sign in {"": 1, **({AGAINST: -1} if turns else {})}.items()
+            for state in ("free", "stuck")
+        }
         chosen = tuple(orders) or (wheel.table.engine_order or 1,)
         turning, waves = np.zeros(0), dict[str, np.ndarray]()
         if fast is not None:
