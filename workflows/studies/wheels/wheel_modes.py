@@ -89,7 +89,7 @@ class WheelModes(StudyResult):
             for order in sorted({m.engine_order for m in crossing}):
                 of_order = [m for m in crossing if m.engine_order == order]
                 each = [f"family {m.family + 1} at {60 * m.speed:.5g} rpm, {m.frequency:.5g} Hz" for m in of_order]
-                where = f"engine order {order}, nodal diameter {of_order[0].diameter}, contact {state}"
+                where = f"by modes at the scene's speed engine order {order}, {of_order[0].diameter} diameters, {state}"
                 texts.append(f"{where}: {', '.join(each)}")
         for order, at in self.critical.items():
             texts.append(
