@@ -96,3 +96,28 @@ def test_the_time_left_is_that_of_the_steady_work() -> None:
     assert progress.time_left(0.01, start, 60.0) == "(compiled for 60 s, once)"
     assert progress.time_left(1.0, start, 0.0) == "0 s left"
     assert progress.time_left(1.5, start, 0.0) == ""
+
+
+def test_every_help_has_an_example_that_can_be_read(capsys: pytest.CaptureFixture[str]) -> None:
+    words = [(name,) for name in cli.WORDS]
+    words += [(*word, name) for word in words for name in cli.app[word[0]] if not name.startswith("-")]
+    for word in [(), *words]:
+        with pytest.raises(SystemExit):
+            cli.main([*word, "--help"])
+        example = re.search(r"Example: tribodyn (.*?)(\n\s*\n|$)", capsys.readouterr().out, re.DOTALL).group(1).split()
+        assert tuple(example[: len(word)]) == word
+        cli.app.parse_args(example, exit_on_error=False, print_error=False)
+
+
+def test_without_a_terminal_a_line_comes_while_nothing_else_is_printed(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(progress, "NOTE_EVERY", 0.2)
+    console = Console(record=True, force_terminal=False, width=200, file=io.StringIO())
+    with progress.Progress(console, details=False).stage("reduction"):
+        time.sleep(1.1)
+    assert re.fullmatch(r"(reduction: [01] s so far\n){3,5}", console.export_text())
+
+
+def test_a_result_in_a_prompt_is_a_few_lines() -> None:
+    lines = repr(result()).splitlines()
+    assert 4 <= len(lines) <= 10
+    assert max(map(len, lines)) <= 120

@@ -25,17 +25,27 @@ if TYPE_CHECKING:
 BAD_INPUT, FAILED_SOLVE, DEFECT, INTERRUPTED = 2, 3, 70, 130
 FULL = (errno.ENOSPC, errno.EFBIG, getattr(errno, "EDQUOT", errno.ENOSPC))  # Windows has no quota
 READER_LEFT = 128 + 13  # as a shell counts the end by SIGPIPE, which Windows has not
-WORDS = {  # word -> where it is, its help on the page of all of them
-    "cases": ("cases_word:cases", "List the scenes that come with the program."),
-    "new": ("file_words:new", "Begin a scene from a mesh, a deck or a CAD file."),
-    "run": ("scene_words:run", "Run a scene and leave its result and pictures in a folder."),
-    "inspect": ("file_words:inspect", "Show what a mesh, a deck, a CAD file or a scene holds."),
-    "plan": ("scene_words:plan", "Show what a scene will model, and what it will cost, before running it."),
-    "show": ("scene_words:show", "Show what a result holds."),
-    "draw": ("scene_words:draw", "Draw pictures or films of a result."),
-    "verify": ("verify_word:verify", "Check a result against direct time integration."),
-    "report": ("scene_words:report", "Write one HTML file that shows results."),
-    "export": ("scene_words:export", "Write a result in the formats of other programs."),
+WORDS = {  # word -> where it is, its help on the page of all of them, an example
+    "cases": ("cases_word:cases", "List the scenes that come with the program.",
+        "cases"),
+    "new": ("file_words:new", "Begin a scene from a mesh, a deck or a CAD file.",
+        "new part.step --out begun"),
+    "run": ("scene_words:run", "Run a scene and leave its result and pictures in a folder.",
+        "run beam --set contact.friction=0.3 --out results/low"),
+    "inspect": ("file_words:inspect", "Show what a mesh, a deck, a CAD file or a scene holds.",
+        "inspect part.step --unit mm"),
+    "plan": ("scene_words:plan", "Show what a scene will model, and what it will cost, before running it.",
+        "plan beam"),
+    "show": ("scene_words:show", "Show what a result holds.",
+        "show results/beam --verbose"),
+    "draw": ("scene_words:draw", "Draw pictures or films of a result.",
+        "draw results/beam --film cycle"),
+    "verify": ("verify_word:verify", "Check a result against direct time integration.",
+        "verify results/beam"),
+    "report": ("scene_words:report", "Write one HTML file that shows results.",
+        "report results/beam results/low --out report.html"),
+    "export": ("scene_words:export", "Write a result in the formats of other programs.",
+        "export results/beam --to csv"),
     "curve": ("curve_words:app", "Follow curves: backbone, ring-down."),
     "wheel": ("wheel_words:app", "Wheels: modes, flutter, mistuned blades and patterns of them."),
     "study": ("study_words:app", "Studies: grid, lives, optimise, identify, converge, asperities and more."),
@@ -44,12 +54,14 @@ WORDS = {  # word -> where it is, its help on the page of all of them
 app = cyclopts.App(
     name="tribodyn",
     help="From geometry to worn surface: vibration, friction and fretting wear of jointed parts.",
+    help_epilogue="Example: tribodyn run vane",
     version=__version__,
     version_flags=["--version"],
     suppress_keyboard_interrupt=False,
 )
-for name, (place, meaning) in WORDS.items():
-    app.command(f"tribodyn.workflows.command.{place}", name=name, help=meaning)
+for name, (place, meaning, *example) in WORDS.items():
+    shown = {"help_epilogue": f"Example: tribodyn {example[0]}"} if example else {}  # a group has its own
+    app.command(f"tribodyn.workflows.command.{place}", name=name, help=meaning, **shown)
 
 
 def main(arguments: Sequence[str] | None = None) -> None:

@@ -16,7 +16,7 @@ from pathlib import Path
 from types import UnionType
 from typing import Annotated, Any, Literal, Union, get_args, get_origin, get_type_hints
 
-from cyclopts import Parameter
+from cyclopts import App, Parameter
 
 from tribodyn.extras import package
 from tribodyn.output_file import printable
@@ -36,6 +36,11 @@ Overrides = Annotated[
 ]
 Json = Annotated[bool, Parameter(name="--json", negative=(), help="Print JSON for machines.")]
 Flag = Annotated[bool, Parameter(negative=())]
+SAMPLES = {  # parameter -> what an example gives it
+    "scene": "beam", "study": "study.toml", "task": "fit.toml", "result": "results/beam", "file": "part.step",
+    "source": "part.step", "measurement": "measured.csv", "first": "face.csv", "pristine": "new.csv",
+    "worn": "worn.csv",
+}  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -175,10 +180,21 @@ def word(study: Callable[..., Any], words: str, *, into: Into = "results") -> Ca
     if "progress" in parameters:
         shown.append(inspect.Parameter("quiet", keyword, default=False, annotation=QUIET))
     call.__name__ = words.split()[-1].replace("-", "_")
+    required = [option for option in options if option.positional and option.default is inspect.Parameter.empty]
+    given = ["turbine" if words.startswith("wheel") else SAMPLES[option.name] for option in required]
+    call.example = " ".join(["Example: tribodyn", words, *given])  # type: ignore[attr-defined]
     call.__doc__ = summary(study.__doc__ or "", list(parameters))
     call.__signature__ = signature = inspect.Signature(sorted(shown, key=lambda p: p.kind))  # type: ignore[attr-defined]
     call.__annotations__ = {p.name: p.annotation for p in shown}
     return call
+
+
+def group(name: str, *words: Any) -> App:
+    """Words of one kind, each made by `word`; the example of the first is that of them all."""
+    app = App(name=name, help_epilogue=words[0].example)
+    for call in words:
+        app.command(call, help_epilogue=call.example)
+    return app
 
 
 QUIET = Annotated[Flag, Parameter(help="Print no progress.")]

@@ -244,6 +244,19 @@ class Result:
     loops: Loops | None = None
     verdict: Verdict | None = None
 
+    def __repr__(self) -> str:
+        """What it is in a few lines, without its arrays."""
+        facts, curve, worn = self.facts, self.response, self.wear
+        size = f"{facts.full_dofs} DOFs, {facts.model_dofs} in the model, {facts.contact_pairs} node pairs in contact"
+        lines = [f"Result of {self.provenance.get('scene_name', '')}: {self.state}", f"model     {size}"]
+        if curve is not None:
+            first, last = np.array([curve.omega.min(), curve.omega.max()]) / (2 * np.pi)
+            lines.append(f"response  {len(curve.omega)} points, {first:.4g} to {last:.4g} Hz")
+        if worn is not None and len(worn.cycles):
+            lines.append(f"wear      {self.wear_steps} steps, {worn.cycles[-1]:.4g} cycles")
+        lines.append(f"errors    {'not stated' if self.verdict is None else 'stated, see summary()'}")
+        return "\n".join(lines)
+
     @property
     def state(self) -> str:
         """A sentence on how far the run came."""

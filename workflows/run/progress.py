@@ -1,6 +1,7 @@
 """Progress of a run for its user, with the time left on long work."""
 
 import sys
+import threading
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -15,7 +16,7 @@ from tribodyn.output_file import printable
 from tribodyn.refusal import Refusal
 
 Advance = Callable[..., None]  # called with the share of long work that is done, a note, and the point it has come to
-NOTE_EVERY = 15.0  # seconds between lines where there is no terminal to draw a bar on
+NOTE_EVERY = 10.0  # seconds between lines where there is no terminal to draw a bar on
 FORESEEN = 0.02  # share of the work from which on the time left is given: the first steps compile
 
 
@@ -24,6 +25,7 @@ class Progress:
 
     def __init__(self, console: Console | None = None, log: Path | None = None, details: bool = True):
         self._console, self._log, self._details = console, log, details
+        self._last_line = 0.0
 
     @property
     def silent(self) -> bool:
@@ -34,8 +36,31 @@ class Progress:
     def stage(self, name: str) -> Iterator[None]:
         """A stage of unknown length."""
         start = time.perf_counter()
-        yield
+        with self._heard(name, start):
+            yield
         self.detail(f"{name}: {time.perf_counter() - start:.1f} s")
+
+    @contextmanager
+    def _heard(self, name: str, start: float) -> Iterator[None]:
+        """Where there is no terminal, a line after each NOTE_EVERY in which nothing else was printed."""
+        if self._console is None or self._console.is_terminal:
+            yield
+            return
+        done = threading.Event()
+
+        def beat() -> None:
+            while not done.wait(max(NOTE_EVERY, 0.1)):
+                if time.perf_counter() - self._last_line >= 0.9 * NOTE_EVERY:
+                    self.say(f"{name}: {time.perf_counter() - start:.0f} s so far")
+
+        self._last_line = start
+        thread = threading.Thread(target=beat, daemon=True)
+        thread.start()
+        try:
+            yield
+        finally:
+            done.set()
+            thread.join()
 
     @contextmanager
     def track(self, name: str) -> Iterator[Advance]:
@@ -59,19 +84,19 @@ class Progress:
 
                 yield advance
         else:
-            yield self._lines(name, start)
+            with self._heard(name, start):
+                yield self._lines(name, start)
         self.detail(f"{name}: {time.perf_counter() - start:.1f} s")
 
     def _lines(self, name: str, start: float, on_console: bool = True) -> Advance:
-        """Lines from time to time, without details at ever longer ones; on_console : whether they go there too."""
-        last, before, wait = start, compiled(), NOTE_EVERY
+        """Lines from time to time; on_console : whether they go there too."""
+        last, before = start, compiled()
 
         def advance(share: float, note: str, *_: object) -> None:
-            nonlocal last, wait
+            nonlocal last
             now, compiling = time.perf_counter(), compiled() - before
-            if now - last >= wait and share > 0:
+            if now - last >= NOTE_EVERY and share > 0:
                 last = now
-                wait *= 1 if self._details else 2
                 remaining = time_left(share, start, compiling)
                 done = f"{share:.0%}" if share <= 1.0 else "longer than estimated"
                 line = f"{name}: {done}{', ' if remaining else ''}{remaining}; {note}".rstrip("; ")
@@ -81,7 +106,7 @@ class Progress:
 
     def say(self, text: str) -> None:
         """One line."""
-        text = printable(text)
+        text, self._last_line = printable(text), time.perf_counter()
         if self._console is not None:
             self._console.print(text, highlight=False, soft_wrap=True, markup=False)
         if self._log is not None:
