@@ -2,11 +2,14 @@
 
 import numpy as np
 import pytest
+import skfem
 
 import tribodyn as td
 from proof.problems import result_of, wear
 from tests.helpers.browser import chromium, clicked_zoomed_and_turned
+from tribodyn.hbm import newton
 from tribodyn.hbm.continuation.methods import arc_length
+from tribodyn.workflows.cases.blade.blade import airfoil_at
 from tribodyn.workflows.cases.turbine import bladed_sector
 from tribodyn.workflows.studies.forces import BodyForces
 
@@ -42,6 +45,28 @@ def test_centrifugal_load_of_the_damper_is_that_of_its_drawing(forces_of: dict[s
     centre = p.under + p.damper_low * p.platform_height + tall * (low + 2 * high) / (3 * (low + high))
     expected = density * p.damper_length * tall * (low + high) / 2 * speed**2 * centre
     assert np.linalg.norm(forces_of["damper"].load) == pytest.approx(expected, rel=2e-3)
+
+
+def test_the_airfoil_carries_what_is_above_it() -> None:
+    """Its mean stress along the span: density, speed squared and radius over the volume above, over the section; what
+    friction of shrouds and bending add is below a twentieth."""
+    model = td.build(td.read_scene("turbine", (*COARSE, "bodies.blade.n_span=8")))
+    state = newton.solve_from_rest(model.balance, 2 * np.pi * 600).state
+    place, height = model.balance.places[0], 0.2225
+    computed = place.stress(model.balance.outputs(state), model.balance.basis)[2, 0]
+    (blade,) = (body.mesh for body in model.part.mesh.bodies if body.name == "blade")
+    points = skfem.Basis(blade, skfem.ElementHex0(), intorder=4)
+    z, volume = np.asarray(points.global_coordinates())[2], points.dx
+    force = 8200 * (2 * np.pi * 100) ** 2 * (z * volume)[z > height].sum()
+    along = np.linspace(0, 1, 101)
+    share = np.full(101, (height - 0.2) / 0.09)
+    low, high = (
+        airfoil_at(bladed_sector.Parameters().upper, np.stack([along, np.full(101, side), share], axis=1))[:, :2]
+        for side in (0.0, 1.0)
+    )
+    x, y = np.concatenate([low, high[::-1]]).T
+    section = abs(x @ np.roll(y, 1) - y @ np.roll(x, 1)) / 2
+    assert computed == pytest.approx(force / section, rel=0.05)
 
 
 @pytest.fixture(scope="module")
