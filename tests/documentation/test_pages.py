@@ -65,15 +65,8 @@ def test_the_long_commands_of_a_page_run(page: Path, tmp_path: Path) -> None:
 def test_the_first_command_draws_what_is_shown(after_the_first_command: Path) -> None:
     pictures = after_the_first_command / "results/vane/pictures"
     curves = {"frf", "cycles_per_step", "peak", "preload", "depth", "energy", "status", "hysteresis"}
-    assert {path.stem for path in pictures.glob("*.png")} == curves | {
-        "patch",
-        "status_maps",
-        "part",
-        "contact",
-        "stress",
-        "haigh",
-        "fatigue",
-    }
+    curves |= {"patch", "status_maps", "part", "contact", "stress", "haigh", "fatigue"}
+    assert {path.stem for path in pictures.glob("*.png")} == curves
     with Image.open(ROOT / "docs/figures/vane_patch.png") as page, Image.open(pictures / "patch.png") as drawn:
         # the unworn state alone: rounding on another processor changes where the contact wears later
         shown, built = (item.crop((0, 0, item.width // 3, item.height)) for item in (page, drawn))

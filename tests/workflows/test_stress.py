@@ -267,17 +267,10 @@ def test_a_sharp_corner_is_not_stated(radius: float, point: tuple[float, ...], t
 def test_no_life_follows_from_a_stress_without_bound(path: Path) -> None:
     """At the border of a clamp neither damage nor life is stated, nor the utilisation along the response."""
     overrides = (
-        "verdict.in_time=false",
-        "pictures.renders=false",
-        "wear.coefficient=2e3 um3/J",
-        "wear.step=0.5 um",
-        "wear.rule=thesis",
-        "wear.max_steps=1",
-        "fatigue.material.knee=1e6",
-        "fatigue.material.exponent=4",
-        "fatigue.material.endurance_limit=40 MPa",
-        "stress.places.root.point=['0 mm', '10 mm', '4 mm']",
-    )
+        "verdict.in_time=false", "pictures.renders=false", "wear.coefficient=2e3 um3/J", "wear.step=0.5 um",
+        "wear.rule=thesis", "wear.max_steps=1", "fatigue.material.knee=1e6", "fatigue.material.exponent=4",
+        "fatigue.material.endurance_limit=40 MPa", "stress.places.root.point=['0 mm', '10 mm', '4 mm']",
+    )  # fmt: skip
     run = td.run(path, overrides=overrides)
     for name in ("stress", "utilisation", "service_life", "fatigue_damage", "utilisation_along_response"):
         statement = run.verdict.statements[name]
