@@ -207,11 +207,10 @@ class WornContact:
 
 @dataclass(frozen=True)
 class SolvedCurve:
-    """A response curve; spread : (n_point,) range of amplitudes by the load path over its middle, None if unknown.
+    """A response curve.
 
     basis : harmonics of its coefficients; places : of the part whose stress is asked for"""
 
     branch: Branch
-    spread: np.ndarray | None = None
     basis: HarmonicBasis | None = None
     places: tuple[StressPlace, ...] = ()

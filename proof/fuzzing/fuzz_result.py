@@ -15,7 +15,6 @@ from tribodyn.workflows.result.verdict import Verdict
 
 MAY_LACK = (
     "patch.free_deflection", "stability.growth", "worn.omega", "worn.amplitude", "wear.preload_at_rest",
-    "bounds.amplitude_low", "bounds.amplitude_high", "bounds.energy_low", "bounds.energy_high",
 )  # fmt: skip
 """Arrays of a result that have nan where there is no number, as their classes say."""
 

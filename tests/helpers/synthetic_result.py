@@ -14,7 +14,6 @@ from tribodyn.workflows.result.result import (
     Patch,
     References,
     Result,
-    ShearBounds,
     Stress,
     WornResponses,
 )
@@ -109,7 +108,6 @@ def result(n_row: int = 9, nx: int = 8) -> Result:
         stability=BranchStability(
             np.abs(np.arange(61) - 25) > 5, np.full(61, -1.0), omega[[20, 30]], np.array([20.5, 30.5]), ("fold", "fold")
         ),
-        bounds=ShearBounds(*np.outer([0.9, 1.1, 0.8, 1.2], np.abs(slipping)), np.full(61, 0.5), np.zeros(61, int)),
         wear=wear,
         worn=WornResponses(
             rows, np.tile(omega, (3, 1)), np.abs([resonance(hertz, 0.015) for hertz in (510, 460, 420)])

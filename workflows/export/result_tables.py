@@ -206,13 +206,6 @@ def response(result: Result, frf: Branch) -> Table:
     columns |= {"energy_J": frf.energy, "newton_steps": frf.newton_steps, "converged": frf.converged}
     if result.stability is not None:
         columns |= {"stable": result.stability.stable, "growth_1_per_s": result.stability.growth}
-    if result.bounds is not None:
-        columns |= {
-            "amplitude_low_m": result.bounds.amplitude_low,
-            "amplitude_high_m": result.bounds.amplitude_high,
-            "energy_low_J": result.bounds.energy_low,
-            "energy_high_J": result.bounds.energy_high,
-        }
     return columns
 
 

@@ -68,11 +68,8 @@ def response(result: Result) -> Figure:
 
 
 def _curve(axes: Any, result: Result, good: np.ndarray, amplitude: np.ndarray, scale: float) -> None:
-    """The response curve: unstable stretches dashed, bifurcations marked, the range over load paths as a band."""
-    marks, bounds, hertz = result.stability, result.bounds, present(result.response).frequency
-    if bounds is not None:
-        low, high = scale * bounds.amplitude_low, scale * bounds.amplitude_high
-        axes.fill_between(hertz[good], low[good], high[good], color=BLUE, alpha=0.25, lw=0, label="any load path")
+    """The response curve: unstable stretches dashed, bifurcations marked."""
+    marks, hertz = result.stability, present(result.response).frequency
     if marks is None:
         axes.plot(hertz[good], amplitude[good], color=BLUE, label="unworn contact")
         return

@@ -184,8 +184,8 @@ def _of_curve(result: Result) -> Iterator[Answer]:
 
 def solved_curve(result: Result) -> SolvedCurve | None:
     """The response curve of a result, None where it has none."""
-    spread, branch = None if result.bounds is None else result.bounds.spread, result.response
-    return None if branch is None else SolvedCurve(branch, spread, _basis(result), result.facts.places)
+    branch = result.response
+    return None if branch is None else SolvedCurve(branch, _basis(result), result.facts.places)
 
 
 def _joints(result: Result) -> list[str]:

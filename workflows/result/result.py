@@ -133,27 +133,6 @@ class References:
 
 
 @dataclass(frozen=True)
-class ShearBounds:
-    """How far the curve depends on the load path of stuck pairs, see hbm.continuation.residual_shear.
-
-    amplitude_low, amplitude_high : (n_point,) range of the first output's amplitude [m]
-    energy_low, energy_high : (n_point,) range of the friction work per cycle [J]
-    stuck : (n_point,) share of the tangential directions that stick all the time; failed : extreme starts not solved"""
-
-    amplitude_low: np.ndarray
-    amplitude_high: np.ndarray
-    energy_low: np.ndarray
-    energy_high: np.ndarray
-    stuck: np.ndarray
-    failed: np.ndarray
-
-    @property
-    def spread(self) -> np.ndarray:
-        """(n_point,) width of the range of amplitudes over its middle."""
-        return np.asarray(2 * (self.amplitude_high - self.amplitude_low) / (self.amplitude_high + self.amplitude_low))
-
-
-@dataclass(frozen=True)
 class Fields:
     """Full displacement of the part in chosen states.
 
@@ -225,7 +204,7 @@ class Result:
     facts : what was modelled and how long it took
     stage : how far the run came; `state` is its sentence
     verdict : its errors, None where none was asked for
-    response : curve of the unworn contact; stability, bounds : of it, where the scene asks for them"""
+    response : curve of the unworn contact; stability : of it, where the scene asks for it"""
 
     provenance: Mapping[str, str]
     scene: Scene
@@ -236,7 +215,6 @@ class Result:
     references: References | None = None
     response: Branch | None = None
     stability: BranchStability | None = None
-    bounds: ShearBounds | None = None
     wear: WearHistory | None = None
     worn: WornResponses | None = None
     fields: Fields | None = None

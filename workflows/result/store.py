@@ -32,7 +32,6 @@ from tribodyn.workflows.result.result import (
     Patch,
     References,
     Result,
-    ShearBounds,
     Stress,
     WornResponses,
 )
@@ -77,9 +76,6 @@ SCHEMA: dict[str, tuple[type, Arrays]] = {
             "point output coefficient": "response:m", "point contact coefficient": "contact:m",
         }),
         ("stability", BranchStability, {"point": "stable growth:1/s", "bifurcation": "omega:rad/s position"}),
-        ("bounds", ShearBounds, {
-            "point": "amplitude_low:m amplitude_high:m energy_low:J energy_high:J stuck failed",
-        }),
         ("wear", WearHistory, {
             "row": "cycles cycles_in_step preload:N omega:rad/s amplitude:m solves step_error preload_at_rest:N growth "
                    "spread mean_error is_stationary periods",

@@ -113,10 +113,6 @@ def judged(scene: Scene, balance: HarmonicBalance, result: Result, frf: Branch, 
         with progress.track("stability") as advance:
             marks = stability_along(balance, frf, on_point=lambda done, of: advance(done / of, ""))
             result = replace(result, stability=marks)
-    if scene.response.bounds and result.bounds is None and balance.contact.n_pair:
-        with progress.track("bounds of residual shear") as advance:
-            bounds = response_curve.shear_bounds(balance, frf, settings.OUTPUT, settings.newton_options(scene), advance)
-            result = replace(result, bounds=bounds)
     return result
 
 

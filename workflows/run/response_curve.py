@@ -1,4 +1,4 @@
-"""The response curve of a scene and what it may ask about it: harmonics, stability, bounds of residual shear, wear."""
+"""The response curve of a scene and what it may ask about it: harmonics, stability, wear."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import replace
@@ -7,7 +7,7 @@ import numpy as np
 
 from tribodyn.hbm import continuation
 from tribodyn.hbm.balance import HarmonicBalance
-from tribodyn.hbm.continuation import control, curve_peaks, harmonic_choice, residual_shear
+from tribodyn.hbm.continuation import control, curve_peaks, harmonic_choice
 from tribodyn.hbm.continuation.branch import Branch, BranchPoint
 from tribodyn.hbm.continuation.harmonic_choice import HarmonicChoice
 from tribodyn.hbm.continuation.methods import arc_length
@@ -15,11 +15,10 @@ from tribodyn.hbm.continuation.nonlinear_modes import BackboneOptions
 from tribodyn.hbm.continuation.peak_refinement import NoPeak
 from tribodyn.hbm.continuation.resonance_peak import AtPeak
 from tribodyn.hbm.harmonics import amplitude
-from tribodyn.hbm.newton import NewtonOptions
 from tribodyn.hbm.outcome import BranchEnd
 from tribodyn.refusal import SolverFailure
 from tribodyn.workflows.result.number_format import measured, sparkline
-from tribodyn.workflows.result.result import Result, ShearBounds, WornResponses
+from tribodyn.workflows.result.result import Result, WornResponses
 from tribodyn.workflows.run import settings
 from tribodyn.workflows.run.progress import Advance
 from tribodyn.workflows.scene.schema import Scene
@@ -108,29 +107,6 @@ def choose_harmonics(
             break
         balance, solved_x = choice.balance, dict(zip(choice.omega, choice.x, strict=True))
     return choice
-
-
-def shear_bounds(
-    balance: HarmonicBalance, branch: Branch, output: str, newton: NewtonOptions, advance: Callable[[float, str], None]
-) -> ShearBounds:
-    """Range of amplitude and energy at every point of a curve, over the two extreme starts of the friction memory.
-
-    Raises  ValueError where the law has no friction memory or harmonic 0 is not kept"""
-    n = len(branch.omega)
-    low, high = np.full((2, n), np.nan), np.full((2, n), np.nan)
-    stuck, failed = np.zeros(n), np.zeros(n, int)
-    for i in range(n):
-        if branch.converged[i]:
-            x = balance.shaped(branch.contact[i])
-            range_at_point = residual_shear.response_bounds(balance, branch.omega[i], x, output, newton)
-            failed[i] = np.sum(~range_at_point.converged)
-            if range_at_point.converged.any():
-                low[:, i], high[:, i] = zip(
-                    range_at_point.amplitude_range(output), range_at_point.energy_range(), strict=True
-                )
-            stuck[i] = range_at_point.stuck[0].mean()
-        advance((i + 1) / n, "")
-    return ShearBounds(low[0], high[0], low[1], high[1], stuck, failed)
 
 
 def worn_responses(

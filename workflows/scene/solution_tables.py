@@ -102,8 +102,6 @@ class Response(Table, stage=SOLVE):
     """Amplitude that is held, or the two that a phase resonance goes between."""
     stability: StrictBool = False
     """Mark where the curve is stable and where it bifurcates."""
-    bounds: StrictBool = False
-    """At every point, how far the response depends on the load path of pairs that always stick."""
     options: dict[str, int | float] = Field(default_factory=dict)
     """Numbers that the continuation method declares as its own."""
 
@@ -140,8 +138,8 @@ class Response(Table, stage=SOLVE):
             raise Refusal(f'expected {kind} with control = "{self.control}"')
         if counts and (not min(a or 0.0 for a in amplitudes) > 0 or len(set(amplitudes)) < len(amplitudes)):
             raise Refusal(f"expected amplitude above 0, and two that differ, got {self.amplitude}")
-        if counts and (self.stability or self.bounds):
-            raise Refusal(f'expected no stability and no bounds with control = "{self.control}"')
+        if counts and self.stability:
+            raise Refusal(f'expected no stability with control = "{self.control}"')
         return self
 
     @property
