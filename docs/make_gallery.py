@@ -151,14 +151,11 @@ def result_at(result: td.Result, at: int) -> td.Result:
 
 def studies(folder: Path) -> Iterator[Path]:
     """What the studies draw: modes of the blade's wheel."""
-    wheel = td.wheel.build(td.read_scene("blade"))
-    families = {state: wheel.diagram(range(21), 4, state == "stuck") for state in ("free", "stuck")}
-    orders = (1, 2, 3, 5, 8, 12, 20)
-    speeds, waves = td.wheel.campbell(wheel, 150.0, 5, orders, 1)
-    critical = {o: td.wheel.critical_speeds(speeds, waves["stuck"][:, i, 0], o) for i, o in enumerate(orders)}
+    orders, figures = (1, 2, 3, 5, 8, 12, 20), td.wheel.modes("blade", 110.0, 120.0).figures()
+    speeds, waves, critical = td.wheel.campbell(td.wheel.build(td.read_scene("blade")), 150.0, 5, orders, 1)
     for name, figure in {
-        "blade_nodal_diameters": td.plot.nodal_diameters(families, "blade"),
-        "blade_safe": td.plot.safe(families, wheel.n_sectors, 110.0, 120.0, "blade"),
+        "blade_nodal_diameters": figures["nodal_diameters"],
+        "blade_safe": figures["safe"],
         "blade_campbell": td.plot.campbell(speeds, waves, orders, critical, "blade"),
     }.items():
         path = folder / f"{name}.png"

@@ -37,11 +37,12 @@ LARGE_ROTATION = 0.05  # of an element [rad]: its sine is off by 0.04 %, its geo
 class Prestress:
     """A static equilibrium and the stiffness about it.
 
-    stiffness : (n_free, n_free) under the stress of its displacement [N/m]
+    stiffness : (n_free, n_free) under the stress of its displacement [N/m]; displacement : (n_free,) [m]
     residual : relative change of that displacement by its own stress once more; rotation : largest of any element [rad]
     """
 
     stiffness: csr_matrix
+    displacement: np.ndarray
     residual: float
     rotation: float
 
@@ -77,7 +78,7 @@ def solve_prestress(
             f"its static deflection of {1e3 * np.abs(q).max():.3g} mm turns elements by {np.degrees(rotation):.2g} "
             f"degrees, and small rotations are assumed, up to {np.degrees(LARGE_ROTATION):.2g}; {LOWER}"
         )
-    return Prestress(stiffness, residual, rotation)
+    return Prestress(stiffness, q, residual, rotation)
 
 
 def largest_rotation(mesh: Any, u: np.ndarray) -> float:

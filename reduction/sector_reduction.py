@@ -80,12 +80,14 @@ def nodal_diameters(
     for index in diameters:
         system, B = wave_system(sector, index)
         K = system.stiffness if stiffness is None else stuck_stiffness(system.stiffness, B, stiffness)
-        if system.gyroscopic is None:
-            omega = modes(K, system.mass, n_modes)[0]
-        else:
-            omega = turning_frequencies(K, system.mass, system.gyroscopic, n_modes)
-        frequencies.append(omega / (2 * np.pi))
+        frequencies.append(wave_frequencies(replace(system, stiffness=K), n_modes))
     return np.array(frequencies)
+
+
+def wave_frequencies(system: SecondOrderSystem, n_modes: int) -> np.ndarray:
+    """The n lowest frequencies (n,) [Hz] of the system of a wave, with its Coriolis forces if there are any."""
+    K, M, G = system.stiffness, system.mass, system.gyroscopic
+    return (modes(K, M, n_modes)[0] if G is None else turning_frequencies(K, M, G, n_modes)) / (2 * np.pi)
 
 
 def distinct(sector: Sector) -> tuple[Sector, np.ndarray]:

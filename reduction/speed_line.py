@@ -8,18 +8,26 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
+from types import SimpleNamespace
 from typing import Any, ClassVar, Self
 
 import numpy as np
 import scipy.linalg as sla
+from scipy.sparse import csr_matrix
 
-from tribodyn.fem.cyclic_symmetry import Sector, wave_system
-from tribodyn.fem.modes import modes
+from tribodyn.fem.cyclic_symmetry import Sector, seam_map, wave_system
+from tribodyn.fem.modes import StaticDivergence, modes
 from tribodyn.fem.system import SecondOrderSystem
 from tribodyn.reduction.limits import LIMITS
 from tribodyn.reduction.linear import stuck_stiffness
 from tribodyn.reduction.model import Damping, ReducedModel, ReductionBasis
-from tribodyn.reduction.sector_reduction import ReducedSector, in_coordinates, reduce_sector, stuck_ritz
+from tribodyn.reduction.sector_reduction import (
+    ReducedSector,
+    in_coordinates,
+    reduce_sector,
+    stuck_ritz,
+    wave_frequencies,
+)
 from tribodyn.reduction.wave_model import IndexSystem, WaveIndices, WaveModel, wave_model
 
 
@@ -138,6 +146,41 @@ class SpeedLine:
             systems = first, *(replace(first, stiffness=congruent(K, T)) for K in self.stiffness[1:])
             self.cache[index] = (systems, B, T) if self.damping is None else _damped((systems, B, T), self.damping)
         return self.cache[index]
+
+    def wave(self, index: int, families: int, stuck: bool) -> Callable[..., np.ndarray]:
+        """Frequencies (families,) [Hz] of a harmonic index, contact open or stuck, by the speed [Hz]; of the opposite
+        index where a second argument says so.
+
+        By Rayleigh and Ritz in the modes at the first of `speeds` and in what the stiffness at the others and Coriolis
+        forces change of these to first order, all by one factor
+        Raises  StaticDivergence where the contact is open and rotation carries away what only it holds"""
+        sector = self.reduced.sector
+        first, B = wave_system(sector, index)
+        T, springs = seam_map(sector, index), self.springs if stuck else 0 * self.springs
+        systems = [
+            replace(first, stiffness=stuck_stiffness(congruent(K, T), np.asarray(B), springs)) for K in self.stiffness
+        ]
+        K, M, G = systems[0].stiffness, first.mass, first.gyroscopic
+        try:
+            factor = sla.cho_factor(K)
+        except sla.LinAlgError:
+            raise StaticDivergence("rotation carries away what only the contact holds") from None
+        solver: Any = SimpleNamespace(solve=lambda force: sla.cho_solve(factor, force, check_finite=False))
+        n_modes = min(2 * families + LIMITS.reported_modes, len(K))
+        _, phi = modes(csr_matrix(K), csr_matrix(M), n_modes, factor=solver)
+        forces = [(system.stiffness - K) @ phi for system in systems[1:]] + ([] if G is None else [G @ phi])
+        shapes = np.concatenate([phi, solver.solve(np.concatenate(forces, axis=1))], axis=1)
+        size = np.sqrt(np.einsum("ij,ij->j", shapes.conj(), M @ shapes).real)
+        V = independent(shapes[:, size > 0] / size[size > 0], M)
+        small = [system.projected(V) for system in systems]
+
+        def frequencies(speed: float, is_opposite: bool = False) -> np.ndarray:
+            system = self.between(small, speed)
+            if is_opposite and system.gyroscopic is not None:
+                system = replace(system, gyroscopic=-system.gyroscopic)
+            return wave_frequencies(system, families)
+
+        return frequencies
 
     def error(self, speed: float, exact: np.ndarray, n_modes: int = 6) -> float:
         """Largest relative error of the lowest frequencies of the stuck wave that interpolation makes at a speed.

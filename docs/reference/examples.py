@@ -199,11 +199,8 @@ families = {state: wheel.diagram(range(6), 2, state == "stuck") for state in ("f
 print(td.wheel.modes("blade", families=2, speeds=2))
 
 # td.wheel.campbell
-speeds, waves = td.wheel.campbell(wheel, 100.0, 2, (1, 2))
-print(speeds, waves["stuck"].shape)  # [Hz], (n_speed, n_order, families)
-
-# td.wheel.critical_speeds
-print(td.wheel.critical_speeds(speeds, waves["stuck"][:, 0, 0], 1))
+speeds, waves, critical = td.wheel.campbell(wheel, 100.0, 2, (1, 2))
+print(speeds, waves["stuck"].shape, critical["stuck"])  # [Hz], (n_speed, n_order, families), [Hz]
 
 # td.plot.nodal_diameters
 td.plot.nodal_diameters(families, "blade").savefig("nodal_diameters.png")
@@ -212,7 +209,6 @@ td.plot.nodal_diameters(families, "blade").savefig("nodal_diameters.png")
 td.plot.safe(families, wheel.n_sectors, 110.0, 120.0, "blade").savefig("safe.png")
 
 # td.plot.campbell
-critical = {order: td.wheel.critical_speeds(speeds, waves["stuck"][:, i, 0], order) for i, order in enumerate((1, 2))}
 td.plot.campbell(speeds, waves, (1, 2), critical, "blade").savefig("campbell.png")
 
 # td.wheel.mistuned

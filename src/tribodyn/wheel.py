@@ -3,10 +3,5 @@
 from tribodyn.workflows.studies.wheels.flutter import Flutter as Flutter, flutter as flutter
 from tribodyn.workflows.studies.wheels.patterns import Patterns as Patterns, patterns as patterns
 from tribodyn.workflows.studies.wheels.unequal_sectors import MistunedSectors as MistunedSectors, mistuned as mistuned
-from tribodyn.workflows.studies.wheels.wheel_model import (
-    Wheel as Wheel,
-    build as build,
-    campbell as campbell,
-    critical_speeds as critical_speeds,
-)
+from tribodyn.workflows.studies.wheels.wheel_model import Wheel as Wheel, build as build, campbell as campbell
 from tribodyn.workflows.studies.wheels.wheel_modes import WheelModes as WheelModes, modes as modes

@@ -9,11 +9,13 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
+import matplotlib as mpl
 import numpy as np
+from matplotlib.figure import Figure
+from matplotlib.ticker import MaxNLocator
 
 from tribodyn.refusal import Refusal
 from tribodyn.workflows.pictures.figures import axes_of, named
-from tribodyn.workflows.pictures.matplotlib_names import Figure, MaxNLocator, mpl
 from tribodyn.workflows.pictures.theme import BLUE, GREY, INK, ORANGE, PAPER, RED, WEAR_MAP
 
 Families = Mapping[str, np.ndarray]
@@ -29,9 +31,7 @@ AGAINST = ", against"  # of a state: waves against the rotation, where they are 
 
 @dataclass(frozen=True)
 class Crossing:
-    """An engine order that excites a mode in the range of speeds.
-
-    speed : at which it does so [Hz]; frequency : of the mode [Hz]"""
+    """An engine order that meets a family of modes of a nodal diameter, at a speed and the frequency there [Hz]."""
 
     engine_order: int
     diameter: int
@@ -40,47 +40,19 @@ class Crossing:
     frequency: float
 
 
+Crossings = Mapping[str, Sequence[Crossing]]
+"""By the state of the contact."""
+
+
 def diameter_of(engine_order: int, n_sectors: int) -> int:
     """The nodal diameter that an engine order excites on a wheel of identical sectors."""
-    remainder = engine_order % n_sectors
-    return min(remainder, n_sectors - remainder)
+    return abs(harmonic_index(engine_order, n_sectors))
 
 
-def crossings(
-    frequency: np.ndarray,
-    n_sectors: int,
-    slow: float,
-    fast: float,
-    highest: int | None = None,
-    against: np.ndarray | None = None,
-) -> list[Crossing]:
-    """Where engine orders that stand in space excite modes in a range of speeds, by engine order and family.
-
-    frequency : (n_diameter, family) of the nodal diameters from 0 on [Hz], taken as the same at all speeds of the range
-    slow, fast : ends of the range [Hz], slow above 0; highest : engine order, None for any
-    against : the same for waves against the rotation, where they differ"""
-    matches: list[Crossing] = []
-    if np.isnan(frequency).all():
-        return matches
-    top = int(np.nanmax(frequency) / slow)
-    for order in range(1, (top if highest is None else min(top, highest)) + 1):
-        diameter = diameter_of(order, n_sectors)
-        if diameter >= len(frequency):
-            continue
-        backward = against is not None and 2 * (order % n_sectors) <= n_sectors
-        for family, hertz in enumerate((against if backward else frequency)[diameter]):  # type: ignore[index]
-            if slow <= hertz / order <= fast:
-                matches.append(Crossing(order, diameter, family, float(hertz / order), float(hertz)))
-    return matches
-
-
-def meetings(families: Families, n_sectors: int, slow: float, fast: float) -> dict[str, list[Crossing]]:
-    """Modes that engine orders up to the number of sectors meet in a range of speeds [Hz], by state of the contact."""
-    return {
-        state: crossings(values, n_sectors, slow, fast, n_sectors, families.get(state + AGAINST))
-        for state, values in families.items()
-        if not state.endswith(AGAINST)
-    }
+def harmonic_index(engine_order: int, n_sectors: int) -> int:
+    """The index, from above -N/2 to N/2, of the wave of an engine order above 0 with the rotation."""
+    index = engine_order % n_sectors
+    return index if 2 * index <= n_sectors else index - n_sectors
 
 
 def _top(families: Families) -> float:
@@ -108,40 +80,32 @@ def _families(axes: Any, values: np.ndarray, style: str, color: str, label: str)
 
 
 def campbell(
-    speeds: np.ndarray,
-    frequencies: Mapping[str, np.ndarray],
-    orders: Sequence[int],
-    critical: Mapping[int, Sequence[float]],
-    scene: str = "",
+    speeds: np.ndarray, frequencies: Mapping[str, np.ndarray], orders: Sequence[int], met: Crossings, scene: str = ""
 ) -> Figure:
-    """Frequencies of several engine orders' waves over the speed, families and directions, with the orders' lines.
+    """Frequencies of several engine orders' waves over the speed, with the orders' lines.
 
-    speeds : (n_speed,) [Hz]; found : "free" and "stuck" (n_speed, n_order, family) [Hz], as studies.wheel.campbell, and
-        "stuck, against" of the waves that run the other way, where these differ
-    critical : engine order -> speeds [Hz] at which it meets its stuck frequencies
-    scene : its name, for the title"""
+    speeds : (n_speed,) [Hz]; frequencies : "free" and "stuck" (n_speed, n_order, family) [Hz], as `td.wheel.campbell`
+        has them; those of orders below 0 are dashed where the opposite order is there too
+    met : where orders meet modes; scene : its name, for the title"""
     with axes_of(7.2, 4.8) as (figure, axes):
-        rpm = 60 * speeds
+        rpm, sizes = 60 * speeds, sorted({abs(order) for order in orders})
         free = frequencies["free"][:, 0]
         if np.isfinite(np.diff(free, axis=0)).any():  # of what only the contact holds they are known at rest alone
             axes.plot(rpm, free, "--", color=GREY, label=_first("free", free))
-        top = 1.08 * max(
-            float(np.nanmax(frequencies["stuck"])), *(s * abs(o) for o, at in critical.items() for s in at), 0.0
-        )
-        for i, (order, color) in enumerate(zip(orders, shades(len(orders)), strict=True)):
-            waves = frequencies["stuck"][:, i]
-            axes.plot(rpm, waves, color=color, label=_first(f"stuck, wave {order}", waves))
-            if (backward := frequencies.get("stuck" + AGAINST)) is not None and -order not in orders:
-                axes.plot(rpm, backward[:, i], "--", color=color, label=_first(f"stuck, wave {-order}", waves))
-            axes.plot(rpm, abs(order) * speeds, ":", color=color)
-            end = min(1.0, top / (abs(order) * speeds[-1]))
+        top = 1.08 * max(float(np.nanmax(frequencies["stuck"])), *(m.frequency for of in met.values() for m in of), 0.0)
+        for size, color in zip(sizes, shades(len(sizes)), strict=True):
+            for i in [i for i, order in enumerate(orders) if abs(order) == size]:
+                waves, style = frequencies["stuck"][:, i], "--" if orders[i] < 0 and size in orders else "-"
+                axes.plot(rpm, waves, style, color=color, label=_first(f"stuck, wave {orders[i]}", waves))
+            axes.plot(rpm, size * speeds, ":", color=color)
+            end = min(1.0, top / (size * speeds[-1]))
             axes.annotate(
-                f"EO {abs(order)}", (end * rpm[-1], end * abs(order) * speeds[-1]), (-8, 3),
+                f"EO {size}", (end * rpm[-1], end * size * speeds[-1]), (-8, 3),
                 textcoords="offset points", ha="right", color=color,
             )  # fmt: skip
-        at = [(60 * speed, abs(order) * speed) for order, all_of in critical.items() for speed in all_of]
-        if at:
-            axes.plot(*np.transpose(at), "o", color=RED, ms=6, zorder=4, ls="none", label="critical speed")
+        for state, color in (("free", GREY), ("stuck", RED)):
+            if at := [(60 * m.speed, m.frequency) for m in met.get(state, ())]:
+                axes.plot(*np.transpose(at), "o", color=color, ms=6, zorder=4, ls="none", label=f"critical, {state}")
         axes.set(xlabel="speed / rpm", ylabel="frequency / Hz", ylim=(0, top))
         axes.set_title(named(scene, "Campbell diagram"))
         axes.set_xlim(0, rpm[-1])
@@ -154,17 +118,25 @@ def _first(label: str, curves: np.ndarray) -> list[str]:
     return [label, *["_"] * (curves.shape[1] - 1)]
 
 
-def safe(families: Families, n_sectors: int, slow: float, fast: float, scene: str = "") -> Figure:
+def safe(
+    families: Families,
+    n_sectors: int,
+    slow: float,
+    fast: float,
+    scene: str = "",
+    met: Crossings | None = None,
+) -> Figure:
     """SAFE diagram: modes over nodal diameters, and what the engine orders reach in a range of speeds.
 
-    slow, fast : ends of the range of speeds [Hz]; modes that an engine order meets there are ringed
-    scene : its name, for the title"""
-    if not 0 < slow < fast:
-        raise Refusal(f"a SAFE diagram from {slow:g} to {fast:g} Hz: give two speeds above 0, the lower one first")
+    families : at the highest speed, from which what is met at a lower one may lie apart
+    slow, fast : ends of the range of speeds [Hz]; scene : its name, for the title
+    met : modes that engine orders meet between them, which are ringed"""
+    if not 0 <= slow < fast:
+        raise Refusal(f"a SAFE diagram from {slow:g} to {fast:g} Hz: give a speed from 0 on and a higher one")
     max_diameter = max(len(values) for values in families.values()) - 1
     top = _top(families)
     with axes_of(7.6, 5.2) as (figure, axes):
-        orders = np.arange(1, min(int(top / slow) + 1, n_sectors) + 1)
+        orders = np.arange(1, min(int(top / slow) + 1 if slow else n_sectors, n_sectors) + 1)
         places = np.array([diameter_of(int(order), n_sectors) for order in orders])
         shown = places <= max_diameter
         for speed, style in ((slow, "-"), (fast, "--")):
@@ -175,7 +147,7 @@ def safe(families: Families, n_sectors: int, slow: float, fast: float, scene: st
         axes.vlines(places[shown], orders[shown] * slow, orders[shown] * fast, color=ORANGE, lw=5, alpha=0.35, zorder=1)
         for state, values in families.items():
             _families(axes, values, *STATES[state])
-        rings = [match for matches in meetings(families, n_sectors, slow, fast).values() for match in matches]
+        rings = [match for matches in (met or {}).values() for match in matches]
         if rings:
             axes.plot(
                 [m.diameter for m in rings], [m.frequency for m in rings], "o", ms=10, mfc="none", color=RED,

@@ -42,9 +42,10 @@ from tribodyn.workflows.scene.wheel_scene import WheelScene
 SEAM = ("cyclic_right", "cyclic_left")  # node sets of a part where the wheel continues without contact
 
 
-def sector(scene: WheelScene, part: Part) -> Sector:
+def sector(scene: WheelScene, part: Part, start: np.ndarray | None = None) -> Sector:
     """The full sector of the scene's wheel; of a rotating wheel, about its static equilibrium at speed.
 
+    start : (n_free,) displacement [m] near that equilibrium; that with all contacts stuck by default
     Raises  Refusal where the faces do not match those of the neighbours, or where wheel.seam is missing, so that the
         disk would be cut open"""
     wheel = scene.wheel
@@ -63,7 +64,7 @@ def sector(scene: WheelScene, part: Part) -> Sector:
     if not wheel.speed:
         return cut
     try:
-        return sector_about_equilibrium(scene, part, cut)
+        return sector_about_equilibrium(scene, part, cut, start)
     except StaticDivergence as divergence:
         size = check_size(np.ptp(part.points, axis=0), "give its unit")
         raise StaticDivergence("; ".join([f"at {60 * wheel.speed:.6g} rpm {divergence}", *size])) from None
@@ -102,39 +103,11 @@ def at_one_speed(scene: WheelScene, part: Part) -> ReducedModel:
 def along_speed(scene: WheelScene, part: Part) -> ReducedModel:
     """The travelling wave of the wheel along its operating line (frequency = engine order times speed), undamped.
 
-    The model is that of wheel.speed; it interpolates to any other speed of the line. The sector is reduced at the two
-    ends of the range, then at speeds between them, equally spaced in speed^2 and halved. This stops when the
-    frequencies interpolated from the other speeds are right at the newest speed to `LIMITS.speed_spacing_error`: four
-    speeds at least, seven at most.
-    Raises  Refusal where the sector has no equilibrium at one of these speeds"""
+    The model is that of wheel.speed; it interpolates to any other speed of the line, four at least.
+    Raises  Refusal as `speed_line` does"""
     wheel = scene.wheel
     low, high = (frequency / abs(wheel.engine_order) for frequency in scene.operating_range)
-    squared_speeds = low**2 + (high**2 - low**2) * np.array([0.0, 1.0, 0.5, 0.25, 0.75, 0.125, 0.875])
-    sectors: list[Sector] = []
-    speeds = np.sqrt(squared_speeds).tolist()  # [Hz]
-    for speed in speeds:
-        wheel_at_speed = wheel.model_copy(update={"speed": speed, "sweep": None})
-        try:
-            sectors.append(sector(scene.model_copy(update={"wheel": wheel_at_speed}), part))
-            if len(sectors) == 2:
-                ends = reduce_alike(sectors, scene.reduction.modes, scene.reduction.cutoff)
-        except Refusal as refusal:
-            raise Refusal(f"at {60 * speed:.6g} rpm of the operating line {refusal}") from None
-        if len(sectors) == 2:
-            springs = joints.contact_stiffness(scene, ends.model)
-            stiffness = (ends.sector.system.stiffness,)
-            line = SpeedLine(ends, stiffness, (speeds[0],), wheel.engine_order, CENTRIFUGAL, wheel.speed, springs)
-        if len(sectors) > 1:
-            stiffness_there = congruent(sectors[-1].system.stiffness, ends.origin.basis)
-            error = line.error(speed, stiffness_there) if len(sectors) > 3 else np.inf
-            line = replace(line, stiffness=(*line.stiffness, stiffness_there), speeds=(*line.speeds, speed))
-            if error <= LIMITS.speed_spacing_error:
-                break
-    prestresses = [sector_at_speed.prestress for sector_at_speed in sectors if sector_at_speed.prestress is not None]
-    accuracy = {
-        "prestress_residual": max(each.residual for each in prestresses),
-        "prestress_rotation": max(each.rotation for each in prestresses),
-    }
+    line, error, accuracy = speed_line(scene, part, low, high, 4, LIMITS.speed_spacing_error)
     wave = line(2 * np.pi * abs(wheel.engine_order) * wheel.speed)
     return SpeedLineModel(
         wave.system, wave.interface, wave.origin, wave.joints, wave.free_frequency,
@@ -143,8 +116,51 @@ def along_speed(scene: WheelScene, part: Part) -> ReducedModel:
     )  # fmt: skip
 
 
-def sector_about_equilibrium(scene: WheelScene, part: Part, cut_sector: Sector) -> Sector:
-    """The sector `cut_sector` of a part, about its static equilibrium at the scene's speed.
+def speed_line(
+    scene: WheelScene, part: Part, first: float, second: float, least: int, tolerance: float
+) -> tuple[SpeedLine, float, dict[str, float]]:
+    """The sector between two speeds [Hz], the first above 0, with its error at the newest speed and its accuracy.
+
+    The sector is reduced at these two speeds, then at speeds between them, equally spaced in speed^2 and halved, so
+    many at `least`, seven at most. This stops when the frequencies interpolated from the other speeds are right at the
+    newest speed to the relative tolerance.
+    Raises  Refusal where the sector has no equilibrium at one of these speeds"""
+    wheel = scene.wheel
+    squared_speeds = first**2 + (second**2 - first**2) * np.array([0.0, 1.0, 0.5, 0.25, 0.75, 0.125, 0.875])
+    sectors: list[Sector] = []
+    speeds = np.sqrt(squared_speeds).tolist()  # [Hz]
+    for speed in speeds:
+        prestress = sectors[0].prestress if sectors else None
+        start = None if prestress is None else (speed / speeds[0]) ** 2 * prestress.displacement
+        wheel_at_speed = wheel.model_copy(update={"speed": speed, "sweep": None})
+        try:
+            sectors.append(sector(scene.model_copy(update={"wheel": wheel_at_speed}), part, start))
+            if len(sectors) == 2:
+                ends = reduce_alike(sectors, scene.reduction.modes, scene.reduction.cutoff)
+        except Refusal as refusal:
+            raise Refusal(f"at {60 * speed:.6g} rpm {refusal}") from None
+        if len(sectors) == 2:
+            springs = joints.contact_stiffness(scene, ends.model)
+            stiffness = (ends.sector.system.stiffness,)
+            line = SpeedLine(ends, stiffness, (speeds[0],), wheel.engine_order, CENTRIFUGAL, wheel.speed, springs)
+        if len(sectors) > 1:
+            stiffness_there = congruent(sectors[-1].system.stiffness, ends.origin.basis)
+            error = line.error(speed, stiffness_there) if len(sectors) >= least else np.inf
+            line = replace(line, stiffness=(*line.stiffness, stiffness_there), speeds=(*line.speeds, speed))
+            if error <= tolerance:
+                break
+    prestresses = [sector_at_speed.prestress for sector_at_speed in sectors if sector_at_speed.prestress is not None]
+    accuracy = {
+        "prestress_residual": max(each.residual for each in prestresses),
+        "prestress_rotation": max(each.rotation for each in prestresses),
+    }
+    return line, error, accuracy
+
+
+def sector_about_equilibrium(
+    scene: WheelScene, part: Part, cut_sector: Sector, start: np.ndarray | None = None
+) -> Sector:
+    """The sector `cut_sector` of a part, about its static equilibrium at the scene's speed; start as for `sector`.
 
     The stress is that under the static loads, solved together with the contact: each pair is closed, slipped or open.
     Stress and contact are found in turns: `solve_prestress` takes the stress from a displacement, `static_displacement`
@@ -165,7 +181,8 @@ def sector_about_equilibrium(scene: WheelScene, part: Part, cut_sector: Sector) 
     def stiffened(stiffness: csr_matrix) -> Sector:
         return replace(cut_sector, system=replace(cut_sector.system, stiffness=stiffness, gyroscopic=coriolis_matrix))
 
-    start = stuck_displacement(scene, stiffened(csr_matrix(cut_sector.system.stiffness + softening)))
+    if start is None:
+        start = stuck_displacement(scene, stiffened(csr_matrix(cut_sector.system.stiffness + softening)))
     equilibrium = solve_prestress(
         part, material, lambda k: static_displacement(scene, stiffened(k)), start, softening, heat
     )

@@ -1,6 +1,7 @@
 """What a file or a scene holds, before it is computed: sizes, masses, groups, gaps, free modes, sanity checks."""
 
 from collections.abc import Iterable, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from itertools import product
 from pathlib import Path
@@ -13,18 +14,20 @@ from tribodyn.fem.assembly import Assembly, Body, group_name
 from tribodyn.fem.couplings import Tie
 from tribodyn.fem.elasticity import assemble, densities
 from tribodyn.fem.material import Material
-from tribodyn.fem.modes import modes, stiffest
+from tribodyn.fem.modes import StaticDivergence, modes, stiffest
 from tribodyn.geometry.mesh import area, facts
 from tribodyn.geometry.sources import foreign_file as sources
 from tribodyn.geometry.sources.deck import Deck
+from tribodyn.reduction.sector_reduction import wave_frequencies
 from tribodyn.refusal import Refusal
 from tribodyn.workflows.pictures import groups as group_pictures
 from tribodyn.workflows.result.number_format import named_lines
-from tribodyn.workflows.run import deck_materials, deck_source, decks, modelling, sanity_checks, scene_assembly
+from tribodyn.workflows.run import deck_materials, deck_source, decks, modelling, sanity_checks, scene_assembly, sector
 from tribodyn.workflows.run.progress import Progress
 from tribodyn.workflows.scene import scene_file
 from tribodyn.workflows.scene.fields import Number, Pressure, quantity
 from tribodyn.workflows.scene.scene_file import AnyPath, Overrides, read_scene
+from tribodyn.workflows.scene.schema import has_wheel
 from tribodyn.workflows.scene.structure_tables import DeckTable
 from tribodyn.workflows.studies.study_result import StudyResult
 
@@ -257,12 +260,16 @@ def _of_scene(file: scene_file.SceneFile, n_modes: int, progress: Progress) -> I
     inspection = of_part(file, part)
     if n_modes:
         with progress.stage("modes"):
-            frequencies = _frequencies(part.system.mass, part.system.stiffness, n_modes)
+            scene, at_rest = file.mesh_scene, True
+            if has_wheel(scene) and scene.wheel.speed:
+                with suppress(StaticDivergence):  # rotation carries away what only the contact holds
+                    frequencies = tuple(wave_frequencies(sector.sector(scene, part).system, n_modes).tolist())
+                    at_rest = False
+            if at_rest:
+                frequencies = _frequencies(part.system.mass, part.system.stiffness, n_modes)
         remarks = (*inspection.remarks, *sanity_checks.check_modes(frequencies))
-        if file.mesh_scene.wheel is not None and file.mesh_scene.wheel.speed:
-            remarks += (
-                "modes are those of the sector alone at rest: wheel modes has those of the wheel at wheel.speed",
-            )
+        if at_rest and scene.wheel is not None and scene.wheel.speed:
+            remarks += ("modes are those at rest: at wheel.speed only the contact holds some body, see wheel modes",)
         inspection = replace(inspection, frequencies=frequencies, remarks=remarks)
     return inspection
 

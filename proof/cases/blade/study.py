@@ -22,7 +22,7 @@ from tribodyn.workflows.pictures.wheel_diagrams import campbell as plot_campbell
 from tribodyn.workflows.result.result import References
 from tribodyn.workflows.run.settings import OUTPUT
 from tribodyn.workflows.scene.scene_file import SceneError, read_scene
-from tribodyn.workflows.studies.wheels.wheel_model import Wheel, build as build_wheel, campbell, critical_speeds, follow
+from tribodyn.workflows.studies.wheels.wheel_model import Wheel, build as build_wheel, campbell, follow
 
 FULL_DIAMETERS = (0, 1, 2, 5, 10, 20)  # that are held against the full sector
 FAMILIES = 4
@@ -229,11 +229,11 @@ def run(
             say(f"reduced against full sector, {state}: frequencies at most {100 * np.abs(errors).max():.2g} % off")
         if highest is not None:
             chosen = [o for o in extent.orders if o <= blade.n_sectors // 2]
-            speeds, outcome = campbell(blade, highest, extent.speeds, chosen)
-            matched = {o: critical_speeds(speeds, outcome["stuck"][:, i, 0], o) for i, o in enumerate(chosen)}
-            for order, at in matched.items():
+            speeds, outcome, critical = campbell(blade, highest, extent.speeds, chosen)
+            for order in chosen:
+                at = [crossing.speed for crossing in critical["stuck"] if crossing.engine_order == order]
                 say(f"engine order {order}: critical at {', '.join(f'{60 * s:.0f}' for s in at) or 'no'} rpm, stuck")
-            drawn["campbell"] = plot_campbell(speeds, outcome, chosen, matched)
+            drawn["campbell"] = plot_campbell(speeds, outcome, chosen, critical)
         by_order = orders(blade, extent)
         drawn["orders"] = blade_figures.orders_figure(by_order)
         by_load = forces(blade, extent)

@@ -63,9 +63,11 @@ def test_diagram_of_blades_alone_and_stuck(blade):
 
 
 def test_critical_speeds_are_where_the_order_meets_its_frequency():
-    speeds = np.linspace(0, 100, 11)
-    assert critical_speeds(speeds, 100 + 1.0 * speeds, 3) == pytest.approx([50.0])
-    assert critical_speeds(speeds, np.full(11, 500.0), 2) == []
+    def wave(speed: float) -> np.ndarray:
+        return np.array([100 + speed, 500.0])
+
+    assert critical_speeds(wave, 3, 0.0, 100.0) == [(0, pytest.approx(50.0))]
+    assert critical_speeds(wave, -6, 0.0, 100.0) == [(0, pytest.approx(20.0)), (1, pytest.approx(500 / 6))]
 
 
 def test_speed_stiffens_and_loads(blade):
@@ -114,3 +116,8 @@ def test_mistuned_wheel(tmp_path, capsys):
     assert_not_blank(tmp_path / "mistuned.png")
     amplification = float(message.split(": ")[1])
     assert 1.1 < amplification < 0.5 * (1 + np.sqrt(8)) * 1.2  # Whitehead's bound for a linear wheel, and some slack
+
+
+def test_a_part_alone_has_no_such_study():
+    with pytest.raises(ValueError, match=r"beam has no \[wheel\]"):
+        build(scene_file.read("beam"))

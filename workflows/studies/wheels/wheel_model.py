@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
-from functools import partial
+from functools import cache, partial
+from itertools import pairwise
 
 import numpy as np
+from scipy.optimize import brentq
 
 from tribodyn.fem.cyclic_symmetry import Sector
 from tribodyn.fem.modes import StaticDivergence
@@ -18,14 +20,20 @@ from tribodyn.hbm.linear.travelling_wave import on_wheel
 from tribodyn.reduction.sector_reduction import ReducedSector, nodal_diameters
 from tribodyn.reduction.wave_model import travelling_wave, wheel_model
 from tribodyn.refusal import SolveFailed
+from tribodyn.workflows.pictures.wheel_diagrams import Crossing, Crossings, harmonic_index
 from tribodyn.workflows.run import joints, modelling, sector as sectors
 from tribodyn.workflows.run.progress import Progress
+from tribodyn.workflows.run.sanity_checks import TYPICAL
 from tribodyn.workflows.scene.scene_file import SceneError, SceneFile
 from tribodyn.workflows.scene.schema import MeshScene, has_wheel
 from tribodyn.workflows.scene.wheel_scene import WheelScene
 from tribodyn.workflows.scene.wheel_tables import WheelTable
 
 MAX_POINTS = 1000  # of a response
+Wave = Callable[[float], np.ndarray]
+"""Frequencies (families,) [Hz] of a wave at a speed [Hz]."""
+Waves = dict[str, dict[int, Wave]]
+"""State of the contact, "free" or "stuck" -> harmonic index -> its wave."""
 
 
 @dataclass(frozen=True)
@@ -112,10 +120,15 @@ class Wheel:
 
     def at_speed(self, speed: float) -> Wheel:
         """The same wheel turning at a speed [Hz]: stiffened by its stress, softened by its frame; not meshed again."""
+        part, turning = self.part_at(speed)
+        return assembled(turning, part)
+
+    def part_at(self, speed: float) -> tuple[Part, SceneFile]:
+        """Its part, not meshed again, and its scene at a speed [Hz]."""
         turning = self.table.model_copy(update={"speed": speed, "sweep": None})
         scene = self.scene.model_copy(update={"wheel": turning})
         part = modelling.make_part(scene, self.part.mesh, dict(self.part.node_sets), self.file.folder)
-        return assembled(replace(self.file, scene=scene), part)
+        return part, replace(self.file, scene=scene)
 
 
 def follow(balance: HarmonicBalance, frequency: tuple[float, float], tolerance: float) -> Branch:
@@ -150,23 +163,70 @@ def assembled(file: SceneFile, part: Part) -> Wheel:
     return Wheel(file, part, full, sectors.reduced(scene, full))
 
 
+def waves_over_speeds(wheel: Wheel, highest: float, indices: Iterable[int], families: int) -> tuple[Waves, float]:
+    """Waves of some harmonic indices, below 0 against the rotation, from rest to a speed [Hz].
+
+    A free wave that rotation carries away has no frequencies, nan
+    Returns them, and their relative error between the speeds at which the stress was computed"""
+    part, turning = wheel.part_at(highest)
+    line, error, _ = sectors.speed_line(wheel_scene(turning), part, highest, 0.0, 3, TYPICAL.line_error)
+    waves: Waves = {"free": {}, "stuck": {}}
+    for index in sorted({abs(index) for index in indices}):
+        for state, computed in waves.items():
+            try:
+                both = line.wave(index, families, state == "stuck")
+            except StaticDivergence:
+                if state == "stuck":
+                    raise
+
+                def both(speed: float, is_opposite: bool = False) -> np.ndarray:
+                    return np.full(families, np.nan)
+
+            computed[index] = cache(both)
+            computed[-index] = cache(partial(both, is_opposite=True)) if index else computed[0]
+    return waves, error
+
+
+def critical_speeds(wave: Wave, order: int, slow: float, fast: float, count: int = 16) -> list[tuple[int, float]]:
+    """Family and speed [Hz] wherever an engine order meets a frequency of its wave between two speeds [Hz].
+
+    count : speeds at which the wave is looked at, between which a family is met once at the most"""
+
+    def miss(speed: float, family: int) -> float:
+        return float(wave(speed)[family]) - abs(order) * speed
+
+    return sorted(
+        (family, float(brentq(miss, low, high, (family,))))
+        for low, high in pairwise(np.linspace(slow, fast, count).tolist())
+        for family in np.flatnonzero((wave(low) > abs(order) * low) & (wave(high) <= abs(order) * high)).tolist()
+    )
+
+
+def crossings(waves: Waves, n_sectors: int, orders: Iterable[int], slow: float, fast: float) -> Crossings:
+    """Modes that engine orders, above 0 with the rotation, meet in a range of speeds [Hz]."""
+    index_of = {order: harmonic_index(order, n_sectors) for order in orders}
+    return {
+        state: [
+            Crossing(order, abs(index), family, speed, abs(order) * speed)
+            for order, index in index_of.items()
+            for family, speed in critical_speeds(of[index], order, slow, fast)
+        ]
+        for state, of in waves.items()
+    }
+
+
 def campbell(
-    wheel: Wheel, highest: float, count: int, orders: Sequence[int], families: int = 2
-) -> tuple[np.ndarray, dict[str, np.ndarray]]:
-    """Speeds (n_speed,), and frequencies (n_speed, n_order, families) of each engine order's wave, free and stuck [Hz].
+    wheel: Wheel, highest: float, count: int, orders: Sequence[int], families: int = 2, waves: Waves | None = None
+) -> tuple[np.ndarray, dict[str, np.ndarray], Crossings]:
+    """Speeds (n_speed,), frequencies (n_speed, n_order, families) of each engine order's wave, free and stuck [Hz], and
+    where it meets these.
 
-    highest : speed [Hz]; count : speeds from rest to it"""
-    speeds = np.linspace(0.0, highest, count)
-    frequencies: dict[str, list[np.ndarray]] = {"free": [], "stuck": []}
-    for speed in speeds:
-        spinning = wheel.at_speed(float(speed))
-        for state, rows in frequencies.items():
-            rows.append(spinning.diagram(orders, families, state == "stuck"))
-    return speeds, {state: np.array(rows) for state, rows in frequencies.items()}
-
-
-def critical_speeds(speeds: np.ndarray, frequency: np.ndarray, order: int) -> list[float]:
-    """Speeds [Hz] at which an engine order meets a frequency (n_speed,) of its wave [Hz]."""
-    miss = frequency - abs(order) * speeds
-    cross = np.flatnonzero((miss[:-1] > 0) != (miss[1:] > 0))
-    return [float(speeds[i] + (speeds[i + 1] - speeds[i]) * miss[i] / (miss[i] - miss[i + 1])) for i in cross]
+    highest : speed [Hz]; count : speeds from rest to it; waves : `waves_over_speeds` up to it, if computed already"""
+    speeds, n = np.linspace(0.0, highest, count), wheel.n_sectors
+    indices = [harmonic_index(order, n) for order in orders]
+    waves = waves or waves_over_speeds(wheel, highest, set(indices), families)[0]
+    frequencies = {
+        state: np.array([[of[index](speed)[:families] for index in indices] for speed in speeds.tolist()])
+        for state, of in waves.items()
+    }
+    return speeds, frequencies, crossings(waves, n, orders, 0.0, highest)

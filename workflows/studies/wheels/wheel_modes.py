@@ -1,22 +1,23 @@
 """The modes of a wheel as tables and pictures: nodal diameters, SAFE and Campbell diagrams."""
 
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, field, fields
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+from matplotlib.figure import Figure
 
 from tribodyn.hbm.threads import limited
 from tribodyn.refusal import Refusal
 from tribodyn.workflows.pictures import wheel_diagrams
-from tribodyn.workflows.pictures.matplotlib_names import Figure
-from tribodyn.workflows.pictures.wheel_diagrams import AGAINST
+from tribodyn.workflows.pictures.wheel_diagrams import AGAINST, Crossing, Crossings, harmonic_index, safe
+from tribodyn.workflows.run.sanity_checks import TYPICAL
 from tribodyn.workflows.scene.fields import Frequency
 from tribodyn.workflows.scene.scene_file import Overrides, Source, read_scene
 from tribodyn.workflows.studies.files import write_files
 from tribodyn.workflows.studies.study_result import StudyResult
-from tribodyn.workflows.studies.wheels.wheel_model import build, campbell, critical_speeds
+from tribodyn.workflows.studies.wheels.wheel_model import build, campbell, crossings, waves_over_speeds
 
 FAMILIES = 3  # of a Campbell diagram, where more cross each other
 
@@ -25,43 +26,32 @@ FAMILIES = 3  # of a Campbell diagram, where more cross each other
 class WheelModes(StudyResult):
     """Modes of a wheel with its contact free and stuck.
 
-    families : "free" and "stuck" (n_diameter, family) [Hz]; slow, fast : range of speeds [Hz], None for none
+    families : "free" and "stuck" (n_diameter, family) [Hz], at the scene's speed; slow, fast : range of speeds [Hz]
+    fastest : the same at the highest one, empty where no range is given, as all that follows
     speeds : (n_speed,) of the Campbell diagram [Hz]; waves : "free" and "stuck" (n_speed, n_order, family) [Hz]
+    critical : where its orders meet these from rest on; met : modes that orders up to the number of sectors, which
+        stand in space, meet in the range; line_error : relative, of frequencies between the speeds of a stress
     formats : of the pictures"""
 
     name: str
     n_sectors: int
     families: dict[str, np.ndarray]
-    slow: float | None
-    fast: float | None
+    slow: float
+    fast: float
     orders: tuple[int, ...]
-    speeds: np.ndarray
-    waves: dict[str, np.ndarray]
+    fastest: dict[str, np.ndarray] = field(default_factory=dict)
+    speeds: np.ndarray = field(default_factory=lambda: np.zeros(0))
+    waves: dict[str, np.ndarray] = field(default_factory=dict)
+    critical: Crossings = field(default_factory=dict)
+    met: Crossings = field(default_factory=dict)
+    line_error: float = 0.0
     formats: tuple[str, ...] = ("png",)
-
-    @property
-    def critical(self) -> dict[int, list[float]]:
-        """Engine order -> speeds [Hz] at which it meets its stuck frequencies."""
-        if not len(self.speeds):
-            return {}
-        stuck = self.waves["stuck"]
-        return {
-            order: sorted(at for family in stuck[:, i].T for at in critical_speeds(self.speeds, family, order))
-            for i, order in enumerate(self.orders)
-        }
-
-    def meetings(self) -> dict[str, list[wheel_diagrams.Crossing]]:
-        """Modes that engine orders meet in the range of speeds, by the state of the contact."""
-        if self.slow is None or self.fast is None:
-            return {}
-        return wheel_diagrams.meetings(self.families, self.n_sectors, self.slow, self.fast)
 
     def figures(self) -> dict[str, Figure]:
         """The pictures by name."""
         figures = {"nodal_diameters": wheel_diagrams.nodal_diameters(self.families, self.name)}
-        if self.slow is not None and self.fast is not None:
-            figures["safe"] = wheel_diagrams.safe(self.families, self.n_sectors, self.slow, self.fast, self.name)
-        if len(self.speeds):
+        if self.fastest:
+            figures["safe"] = safe(self.fastest, self.n_sectors, self.slow, self.fast, self.name, self.met)
             figures["campbell"] = wheel_diagrams.campbell(
                 self.speeds, self.waves, self.orders, self.critical, self.name
             )
@@ -72,8 +62,8 @@ class WheelModes(StudyResult):
         return {
             "sectors": self.n_sectors,
             "families_hz": {state: values.tolist() for state, values in self.families.items()},
-            "met": {state: [asdict(m) for m in crossing] for state, crossing in self.meetings().items()},
-            "critical_hz": {str(order): at for order, at in self.critical.items()},
+            "met": {state: [asdict(m) for m in of] for state, of in self.met.items()},
+            "critical": {state: [asdict(m) for m in of] for state, of in self.critical.items()},
         }
 
     def lines(self) -> list[str]:
@@ -85,24 +75,47 @@ class WheelModes(StudyResult):
                 continue
             low, high = values[:, 0].min(), values[:, 0].max()
             texts.append(f"first family, contact {state}: {low:.6g} to {high:.6g} Hz")
-        for state, crossing in self.meetings().items():
-            for order in sorted({m.engine_order for m in crossing}):
+        for state, crossing in self.met.items():
+            for order in sorted({m.engine_order for m in crossing}, key=abs):
                 of_order = [m for m in crossing if m.engine_order == order]
                 each = [f"family {m.family + 1} at {60 * m.speed:.5g} rpm, {m.frequency:.5g} Hz" for m in of_order]
-                where = f"by modes at the scene's speed engine order {order}, {of_order[0].diameter} diameters, {state}"
+                where = f"engine order {order}, nodal diameter {of_order[0].diameter}, contact {state}"
                 texts.append(f"{where}: {', '.join(each)}")
-        for order, at in self.critical.items():
+        for state, crossing in self.critical.items():
+            for order in self.orders:
+                at = ", ".join(f"{60 * m.speed:.0f}" for m in crossing if m.engine_order == order) or "no"
+                texts.append(f"engine order {order}: critical at {at} rpm, {state}")
+        if self.line_error > TYPICAL.line_error:
             texts.append(
-                f"engine order {order}: critical at {', '.join(f'{60 * s:.0f}' for s in at) or 'no'} rpm, stuck"
+                f"warning: its stress changes abruptly along the speed: frequencies hold to {self.line_error:.1e}"
             )
         return texts
 
     def write(self, folder: Path) -> list[Path]:
-        """Write nodal_diameters.csv and the pictures."""
+        """Write nodal_diameters.csv, campbell.csv, the speeds at which modes are met as safe.csv, and the pictures."""
         columns = {"nodal_diameter": np.arange(len(self.families["stuck"]))}
         for state, values in self.families.items():
-            columns |= {f"{state.replace(', ', '_')}_{i + 1}_Hz": values[:, i] for i in range(values.shape[1])}
-        return write_files(folder, {"nodal_diameters": columns}, self.figures(), self.formats)
+            columns |= {f"{_named(state)}_{i + 1}_Hz": values[:, i] for i in range(values.shape[1])}
+        tables: dict[str, dict[str, Any]] = {"nodal_diameters": columns}
+        if self.fastest:
+            tables["campbell"] = {"speed_rpm": 60 * self.speeds} | {
+                f"{_named(state)}_order_{order}_{i + 1}_Hz": values[:, k, i]
+                for state, values in self.waves.items()
+                for k, order in enumerate(self.orders)
+                for i in range(values.shape[2])
+            }
+            rows = [
+                {"contact": state, **asdict(m), "family": m.family + 1} for state, of in self.met.items() for m in of
+            ]
+            units = {"speed": "speed_Hz", "frequency": "frequency_Hz"}
+            names = ("contact", *(each.name for each in fields(Crossing)))
+            tables["safe"] = {units.get(name, name): [row[name] for row in rows] for name in names}
+        return write_files(folder, tables, self.figures(), self.formats)
+
+
+def _named(state: str) -> str:
+    """A state of the contact in the name of a column."""
+    return state.replace(", ", "_")
 
 
 def modes(
@@ -118,23 +131,21 @@ def modes(
 ) -> WheelModes:
     """Show the modes of a wheel: nodal diameters, and SAFE and Campbell diagrams of a range of speeds.
 
-    Contact free and stuck, at the scene's speed; the Campbell diagram has the modes at each speed.
+    Contact free and stuck: nodal diameters at the scene's speed, the other two diagrams at each speed of their range.
 
     scene : name of a scene with a [wheel], or a .toml file
-    start : lowest speed of the SAFE diagram, such as 3000rpm
-    stop : highest speed of the SAFE diagram, and of the Campbell diagram; no such diagrams by default
+    start : lowest speed of the SAFE diagram, such as 3000rpm; rest by default
+    stop : highest speed of the SAFE and Campbell diagrams; no such diagrams by default
     orders : engine orders of the Campbell diagram; that of the scene by default
     families : modes of each nodal diameter
     speeds : speeds of the Campbell diagram, from rest to the highest
     formats : formats of the pictures, png, pdf or svg; can be repeated
     Raises  SceneError for a scene without a wheel; Refusal for what cannot be"""
-    slow, fast = start, stop
+    slow, fast = start or 0.0, stop or 0.0
     if families < 1:
         raise Refusal(f"--families {families}: ask for 1 at least")
-    if (slow is not None and fast is None) or (
-        fast is not None and not (fast > 0 and (slow is None or 0 < slow < fast))
-    ):
-        raise Refusal("--from and --to: give speeds above 0, the lower one first, the highest one in any case")
+    if (start is not None or stop is not None) and not 0 <= slow < fast:
+        raise Refusal("--from and --to: give speeds from 0 on, the lower one first, and the highest one in any case")
     if speeds < 2:
         raise Refusal(f"--speeds {speeds}: a Campbell diagram needs 2 at least")
     if 0 in orders:
@@ -142,19 +153,28 @@ def modes(
     file = read_scene(scene, overrides)
     with limited(file.scene.solver.threads):
         wheel = build(file)
-        diameters = range(wheel.n_sectors // 2 + 1)
-        turns = wheel.full.system.gyroscopic is not None
+        n, turns = wheel.n_sectors, wheel.full.system.gyroscopic is not None
+        diameters = range(n // 2 + 1)
+        ways = {"": 1, AGAINST: -1} if turns else {"": 1}
         diagrams = {
             state + way: wheel.diagram([sign * d for d in diameters], families, state == "stuck")
-            for way, sign in {"": 1, **({AGAINST: -1} if turns else {})}.items()
+            for way, sign in ways.items()
             for state in ("free", "stuck")
         }
         chosen = tuple(orders) or (wheel.table.engine_order or 1,)
-        turning, waves = np.zeros(0), dict[str, np.ndarray]()
-        if fast is not None:
-            shown = chosen + (tuple(-order for order in chosen) if turns else ())
-            turning, each = campbell(wheel, fast, speeds, shown, min(families, FAMILIES))
-            waves = {state: rows[:, : len(chosen)] for state, rows in each.items()}
-            if turns:
-                waves["stuck" + AGAINST] = each["stuck"][:, len(chosen) :]
-    return WheelModes(file.name, wheel.n_sectors, diagrams, slow, fast, chosen, turning, waves, tuple(formats))
+        if not fast:
+            return WheelModes(file.name, n, diagrams, slow, fast, chosen, formats=tuple(formats))
+        waves, error = waves_over_speeds(wheel, fast, [*diameters, *(-d for d in diameters)], families)
+        if wheel.table.coriolis:
+            chosen = tuple(dict.fromkeys((*chosen, *(-order for order in chosen))))
+        turning, each, critical = campbell(wheel, fast, speeds, chosen, min(families, FAMILIES), waves)
+        fastest = {
+            state + way: np.array([of[harmonic_index(sign * d, n)](fast) for d in diameters])
+            for way, sign in {"": 1, AGAINST: -1}.items()
+            for state, of in waves.items()
+            if wheel.table.coriolis or not way
+        }
+        met = crossings(waves, n, range(-1, -n - 1, -1), slow, fast)
+    return WheelModes(
+        file.name, n, diagrams, slow, fast, chosen, fastest, turning, each, critical, met, error, tuple(formats)
+    )
