@@ -44,7 +44,7 @@ LIMITS = {
     "commands": 13,
     "public names": 40,
     "constants": 481,
-    "lines": 56_600,
+    "lines": 56_450,
     "lines of tests": 32_000,
     "lines of proof": 8_500,
     "lines of one file": 330,
@@ -56,10 +56,10 @@ LIMITS = {
     "private words of 10 000": 40,
 }
 # limit -> number of the issue of a new ability -> what that issue allows besides
-GRANTS: dict[str, dict[int, int]] = {"lines": {57: 1_200, 58: 1_500, 59: 900, 62: 150}}
+GRANTS: dict[str, dict[int, int]] = {"lines": {57: 1_200, 58: 1_500, 59: 900}}
 # limits that are not met yet -> what there is; it only falls, and goes when the limit is met
 MISSED = {
-    "lines": 62_429,
+    "lines": 62_244,
 }
 
 

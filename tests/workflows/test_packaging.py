@@ -149,7 +149,7 @@ def test_a_fresh_environment_runs_a_scene_beside_llama_index_workflows(wheel: Pa
     subprocess.run([sys.executable, "-m", "venv", str(tmp_path / "fresh")], check=True)
     python = tmp_path / "fresh" / "bin" / "python"
     environment = {name: value for name, value in os.environ.items() if name != "PYTHONPATH"}
-    words = ["-m", "pip", "install", "-q", str(wheel), "llama-index-workflows"]
+    words = ["-m", "pip", "install", "-q", f"{wheel}[mesh]", "llama-index-workflows"]
     subprocess.run([python, *words], check=True, env=environment, cwd=tmp_path)
     sets = [word for text in SMALL for word in ("--set", text)]
     run = ["-m", "tribodyn", "run", "beam", "--no-pictures", *sets, "--out", "out"]

@@ -277,7 +277,7 @@ def _of_scene(file: scene_file.SceneFile, n_modes: int, progress: Progress) -> I
 def of_part(file: scene_file.SceneFile, part: Any) -> Inspection:
     """The facts of a part of a scene that is assembled already."""
     scene = file.mesh_scene
-    solids = _solids(file, part)
+    solids = [replace(body, name=body.name or file.name) for body in part.mesh.bodies]
     inspection = measured(solids, sanity_checks.notes(file, part))
     gap = np.asarray(part.interface.gap)
     gaps = {
@@ -290,11 +290,6 @@ def of_part(file: scene_file.SceneFile, part: Any) -> Inspection:
         *sanity_checks.check_deflection(scene, part.system, part.largest, float(np.linalg.norm(inspection.size))),
     ]
     return replace(inspection, gaps=gaps, remarks=tuple(remarks))
-
-
-def _solids(file: scene_file.SceneFile, part: Any) -> list[Body]:
-    """The bodies of a part."""
-    return [replace(body, name=body.name or file.name) for body in part.mesh.bodies]
 
 
 def measured(solids: Sequence[Body], sentences: Iterable[str] = (), unused: Iterable[str] = ()) -> Inspection:
