@@ -9,13 +9,11 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-import matplotlib as mpl
 import numpy as np
-from matplotlib.figure import Figure
-from matplotlib.ticker import MaxNLocator
 
 from tribodyn.refusal import Refusal
 from tribodyn.workflows.pictures.figures import axes_of, named
+from tribodyn.workflows.pictures.matplotlib_names import Figure, MaxNLocator, mpl
 from tribodyn.workflows.pictures.theme import BLUE, GREY, INK, ORANGE, PAPER, RED, WEAR_MAP
 
 Families = Mapping[str, np.ndarray]

@@ -9,9 +9,7 @@ from pathlib import Path
 from time import process_time
 from typing import Annotated
 
-import matplotlib as mpl
 import numpy as np
-from matplotlib.figure import Figure
 
 from tribodyn.fem.cyclic_symmetry import sector_maps
 from tribodyn.hbm.balance import HarmonicBalance
@@ -22,6 +20,7 @@ from tribodyn.hbm.threads import limited
 from tribodyn.reduction.linear_damping import modal_damping_towards
 from tribodyn.refusal import Refusal
 from tribodyn.workflows.pictures.figures import axes_of, length_unit
+from tribodyn.workflows.pictures.matplotlib_names import Figure, mpl
 from tribodyn.workflows.pictures.theme import INK, WEAR_MAP
 from tribodyn.workflows.run.settings import OUTPUT
 from tribodyn.workflows.scene.fields import Number, quantity

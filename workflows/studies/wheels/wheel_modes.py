@@ -6,11 +6,11 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from matplotlib.figure import Figure
 
 from tribodyn.hbm.threads import limited
 from tribodyn.refusal import Refusal
 from tribodyn.workflows.pictures import wheel_diagrams
+from tribodyn.workflows.pictures.matplotlib_names import Figure
 from tribodyn.workflows.pictures.wheel_diagrams import AGAINST, Crossing, Crossings, harmonic_index, safe
 from tribodyn.workflows.run.sanity_checks import TYPICAL
 from tribodyn.workflows.scene.fields import Frequency
