@@ -175,6 +175,7 @@ def test_depth_and_life_are_those_of_a_finer_wear_run() -> None:
     stated(result, result.wear.unstable_share or 0.0)
 
 
+@pytest.mark.slow
 def test_a_coarser_mesh_is_worn_where_a_finer_one_takes_too_much_work() -> None:
     """Its life ends where the scene says, too; an unstable share of the cycles is doubt."""
     ended = ("wear.at=700 Hz", "wear.tolerance=60 %", "wear.lost_below=5 %")

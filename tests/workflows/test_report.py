@@ -152,7 +152,7 @@ SMALL = {
 }  # fmt: skip
 
 
-# one part that wears, as the blade; a part and its contacts, as the pressed halves of test_scene_brb
+# one part that wears, as the blade
 LIKE_OTHERS = ("beam", "leaf_seal", "rig")
 
 

@@ -156,7 +156,7 @@ def test_a_run_killed_again_and_again_at_its_last_row_keeps_one_of_it(finished, 
 
 
 @pytest.mark.faults
-@pytest.mark.parametrize("rule", ["thesis", "error_controlled"])
+@pytest.mark.parametrize("rule", ["thesis", pytest.param("error_controlled", marks=pytest.mark.slow)])
 def test_ten_kills_at_random_moments_change_no_bit(rule: str, tmp_path: Path) -> None:
     smallest = (*SMALLER, "geometry.n_length=2", "reduction.modes=3", "harmonics.samples=32", "response.points=5")
     overrides = (*smallest, f"wear.rule={rule}", "wear.step=40 %", "wear.tolerance=0.4", "wear.lost_below=0.3")

@@ -151,7 +151,8 @@ def test_references_of_a_beam_that_hangs_free_are_those_of_its_dynamic_stiffness
             assert height[at] == pytest.approx(expected, rel=1e-4)
 
 
-@pytest.mark.parametrize("faces", ["plain", pytest.param("flat", marks=pytest.mark.slow)])
+@pytest.mark.slow
+@pytest.mark.parametrize("faces", ["plain", "flat"])
 def test_the_report_is_clicked_zoomed_and_turned(faces, chromium, tmp_path: Path, monkeypatch):
     model, name = built(faces), SCENES[faces][0]
     monkeypatch.setattr(modelling, "build", lambda file, *_: model)

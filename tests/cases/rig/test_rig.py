@@ -105,6 +105,7 @@ def test_frequencies_of_the_joint_model_are_those_of_the_rig(rig, joints):
         np.testing.assert_allclose(joints.modes({}, state).frequency[:3], exact, rtol=3e-3)
 
 
+@pytest.mark.slow
 def test_the_scene_has_the_fitted_joints(joints):
     """What the scene states is what the fit finds, here on a coarser contact grid."""
     fitted_joints = rig_fit.fit_joints(joints)
