@@ -190,7 +190,7 @@ def _signature(stream: BinaryIO, path: Path, signing_key: bytes) -> bytes:
 
 
 def _read(path: Path, signing_key: bytes) -> Any:
-    """What an entry holds, None where there is none, or it is not the user's own or damaged."""
+    """What an entry holds, None where there is none, it is not the user's own, damaged, or needs a missing package."""
     if not path.is_file():
         return None
     try:
@@ -202,7 +202,7 @@ def _read(path: Path, signing_key: bytes) -> Any:
             stream.seek(start)
             os.utime(path)
             return pickle.load(stream)
-    except OSError:
+    except (OSError, ModuleNotFoundError):
         return None
 
 
