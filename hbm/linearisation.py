@@ -179,10 +179,8 @@ class Linearisation:
             g = np.zeros(self._shape)
             g[row] = unit
             displacement = self._point.apply(g)[..., None]
-            cosine, sine = (
-                displacement[:, s::2],
-                displacement[:, s + 1 :: 2],
-            )  # sine moves by -sine, cosine
+            # a unit of sine moves by -sine and cosine
+            cosine, sine = displacement[:, s::2], displacement[:, s + 1 :: 2]
             block = columns[:, :, row // n_comp]
             block[:, :s] -= displacement[:, :s] * pushed[:s]
             block[:, s::2] -= cosine * pushed[s::2] - sine * pushed[s + 1 :: 2]

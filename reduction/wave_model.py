@@ -1,6 +1,6 @@
 """Models of a wheel: travelling waves by harmonic index, or all sectors at once; see `sector_reduction`."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from math import gcd
 from typing import ClassVar, Self
@@ -21,6 +21,32 @@ WaveIndex = Callable[[int], IndexSystem]
 """Computes those of an index from 0 to N - 1."""
 IndexChange = Callable[[int, SecondOrderSystem, np.ndarray], SecondOrderSystem]
 """Replaces the system of an index, given its contact map (n_contact, n)."""
+
+
+@dataclass(frozen=True)
+class Crossing:
+    """An engine order that meets a family of modes of a nodal diameter, at a speed and the frequency there [Hz]."""
+
+    engine_order: int
+    diameter: int
+    family: int
+    speed: float
+    frequency: float
+
+
+Crossings = Mapping[str, Sequence[Crossing]]
+"""By the state of the contact."""
+
+
+def diameter_of(engine_order: int, n_sectors: int) -> int:
+    """The nodal diameter that an engine order excites on a wheel of identical sectors."""
+    return abs(harmonic_index(engine_order, n_sectors))
+
+
+def harmonic_index(engine_order: int, n_sectors: int) -> int:
+    """The index, from above -N/2 to N/2, of the wave of an engine order above 0 with the rotation."""
+    index = engine_order % n_sectors
+    return index if 2 * index <= n_sectors else index - n_sectors
 
 
 @dataclass(frozen=True)

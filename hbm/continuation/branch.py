@@ -115,9 +115,10 @@ class Branch:
             if not self.converged[i]:
                 return f"the response is highest beside {self.frequency[i]:.5g} Hz, where no solution was found"
         for hertz, end in zip(self.frequency, self.outcome, strict=True):
-            if end.kind in SOLVED[1:]:
-                beside = f"none was found beside the point at {hertz:.5g} Hz; more response.points"
-                return beside if end.kind is SolveEnd.BESIDE_PEAK else str(end)
+            if end.kind is SolveEnd.UNLIMITED:
+                return str(end)
+            if end.kind is SolveEnd.BESIDE_PEAK:
+                return f"none was found beside the point at {hertz:.5g} Hz; more response.points"
         return ""
 
     def inserted(self, at: int, point: BranchPoint) -> Branch:

@@ -10,8 +10,8 @@ from proof.cases.blade.few_sectors import FEW_SECTORS
 from tests.helpers.command import printed_record, refusal
 from tests.helpers.pictures import assert_not_blank
 from tests.helpers.synthetic_result import result
+from tribodyn.reduction.wave_model import Crossing, diameter_of
 from tribodyn.workflows.pictures import loop_plots, maps, wheel_diagrams
-from tribodyn.workflows.pictures.wheel_diagrams import Crossing
 from tribodyn.workflows.studies.wheels.wheel_model import crossings
 
 
@@ -21,7 +21,7 @@ def test_an_engine_order_excites_the_diameter_that_its_samples_have(n_sectors: i
     for order in range(3 * n_sectors):
         samples = np.exp(2j * np.pi * order * np.arange(n_sectors) / n_sectors)
         place = int(np.argmax(np.abs(np.fft.fft(samples))))
-        assert wheel_diagrams.diameter_of(order, n_sectors) == min(place, n_sectors - place)
+        assert diameter_of(order, n_sectors) == min(place, n_sectors - place)
 
 
 def constant(frequency: float) -> Callable[[float], np.ndarray]:
@@ -74,7 +74,7 @@ def test_the_command_draws_the_modes_of_a_wheel(tmp_path: Path, capsys: pytest.C
     assert stuck.shape == (5, 2)
     assert (stuck >= free * (1 - 1e-9)).all()  # springs can only stiffen
     for matched in record["met"]["stuck"]:
-        assert matched["diameter"] == wheel_diagrams.diameter_of(matched["engine_order"], 8)
+        assert matched["diameter"] == diameter_of(matched["engine_order"], 8)
         assert 50.0 <= matched["speed"] <= 150.0
         assert matched["frequency"] == pytest.approx(-matched["engine_order"] * matched["speed"])
 

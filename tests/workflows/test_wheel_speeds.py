@@ -8,7 +8,7 @@ import pytest
 import tribodyn as td
 from tests.helpers.wheel_scene import WHEEL
 from tribodyn.fem.modes import turning_frequencies
-from tribodyn.workflows.pictures.wheel_diagrams import harmonic_index
+from tribodyn.reduction.wave_model import harmonic_index
 from tribodyn.workflows.scene import scene_file
 from tribodyn.workflows.studies.wheels import wheel_model as wheels
 

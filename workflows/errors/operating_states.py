@@ -105,7 +105,9 @@ def first_state(file: SceneFile, balance: HarmonicBalance, result: Result) -> Op
 
 
 def state_at_peak(scene: Scene, balance: HarmonicBalance, branch: Branch) -> OperatingState:
-    """The state at the highest point, which is no peak at its frequency; NoPeak where nothing limits a resonance."""
+    """The state at the highest point of a response; one that is no peak is solved at its frequency.
+
+    Raises  NoPeak where nothing limits a resonance"""
     if any(outcome.kind is SolveEnd.UNLIMITED for outcome in branch.outcome):
         raise NoPeak(f"no peak: {branch.no_peak(settings.OUTPUT)}")
     point = highest_point(branch, balance)

@@ -6,11 +6,11 @@ N sectors alone. An excitation that stands in space runs against the rotation, a
 diameters; seen through the sectors, orders from N/2 to N run with it. Coriolis forces part the two."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
+from tribodyn.reduction.wave_model import Crossings, diameter_of
 from tribodyn.refusal import Refusal
 from tribodyn.workflows.pictures.figures import axes_of, named
 from tribodyn.workflows.pictures.matplotlib_names import Figure, MaxNLocator, mpl
@@ -25,32 +25,6 @@ STATES = {
     "stuck, against": (".--", BLUE, "stuck, against the rotation"),
 }  # fmt: skip
 AGAINST = ", against"  # of a state: waves against the rotation, where they are others than those with it
-
-
-@dataclass(frozen=True)
-class Crossing:
-    """An engine order that meets a family of modes of a nodal diameter, at a speed and the frequency there [Hz]."""
-
-    engine_order: int
-    diameter: int
-    family: int
-    speed: float
-    frequency: float
-
-
-Crossings = Mapping[str, Sequence[Crossing]]
-"""By the state of the contact."""
-
-
-def diameter_of(engine_order: int, n_sectors: int) -> int:
-    """The nodal diameter that an engine order excites on a wheel of identical sectors."""
-    return abs(harmonic_index(engine_order, n_sectors))
-
-
-def harmonic_index(engine_order: int, n_sectors: int) -> int:
-    """The index, from above -N/2 to N/2, of the wave of an engine order above 0 with the rotation."""
-    index = engine_order % n_sectors
-    return index if 2 * index <= n_sectors else index - n_sectors
 
 
 def _top(families: Families) -> float:

@@ -36,25 +36,25 @@ class Progress:
     def stage(self, name: str) -> Iterator[None]:
         """A stage of unknown length."""
         start = time.perf_counter()
-        with self._heard(name, start):
+        with self._lines_while_silent(name, start):
             yield
         self.detail(f"{name}: {time.perf_counter() - start:.1f} s")
 
     @contextmanager
-    def _heard(self, name: str, start: float) -> Iterator[None]:
+    def _lines_while_silent(self, name: str, start: float) -> Iterator[None]:
         """Where there is no terminal, a line after each NOTE_EVERY in which nothing else was printed."""
         if self._console is None or self._console.is_terminal:
             yield
             return
         done = threading.Event()
 
-        def beat() -> None:
+        def print_line() -> None:
             while not done.wait(max(NOTE_EVERY, 0.1)):
                 if time.perf_counter() - self._last_line >= 0.9 * NOTE_EVERY:
                     self.say(f"{name}: {time.perf_counter() - start:.0f} s so far")
 
         self._last_line = start
-        thread = threading.Thread(target=beat, daemon=True)
+        thread = threading.Thread(target=print_line, daemon=True)
         thread.start()
         try:
             yield
@@ -84,7 +84,7 @@ class Progress:
 
                 yield advance
         else:
-            with self._heard(name, start):
+            with self._lines_while_silent(name, start):
                 yield self._lines(name, start)
         self.detail(f"{name}: {time.perf_counter() - start:.1f} s")
 

@@ -18,9 +18,8 @@ from tribodyn.hbm.continuation.branch import Branch
 from tribodyn.hbm.continuation.methods import adaptive
 from tribodyn.hbm.linear.travelling_wave import on_wheel
 from tribodyn.reduction.sector_reduction import ReducedSector, nodal_diameters
-from tribodyn.reduction.wave_model import travelling_wave, wheel_model
+from tribodyn.reduction.wave_model import Crossing, Crossings, harmonic_index, travelling_wave, wheel_model
 from tribodyn.refusal import SolveFailed
-from tribodyn.workflows.pictures.wheel_diagrams import Crossing, Crossings, harmonic_index
 from tribodyn.workflows.run import joints, modelling, sector as sectors
 from tribodyn.workflows.run.progress import Progress
 from tribodyn.workflows.run.sanity_checks import TYPICAL

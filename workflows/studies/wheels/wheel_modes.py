@@ -8,10 +8,11 @@ from typing import Any
 import numpy as np
 
 from tribodyn.hbm.threads import limited
+from tribodyn.reduction.wave_model import Crossing, Crossings, harmonic_index
 from tribodyn.refusal import Refusal
 from tribodyn.workflows.pictures import wheel_diagrams
 from tribodyn.workflows.pictures.matplotlib_names import Figure
-from tribodyn.workflows.pictures.wheel_diagrams import AGAINST, Crossing, Crossings, harmonic_index, safe
+from tribodyn.workflows.pictures.wheel_diagrams import AGAINST, safe
 from tribodyn.workflows.run.sanity_checks import TYPICAL
 from tribodyn.workflows.scene.fields import Frequency
 from tribodyn.workflows.scene.scene_file import Overrides, Source, read_scene
