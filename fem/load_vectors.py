@@ -178,8 +178,8 @@ def temperature_at(path: Path, points: np.ndarray) -> np.ndarray:
     Raises  Refusal for a file that is no such table"""
     try:
         lines = text_of(path).splitlines()
-        has_names = numbers_of(lines[0].split(",")) is None
-        table = np.loadtxt(lines[has_names:], delimiter=",", comments="#", ndmin=2)
+        first = 0 if numbers_of(lines[0].split(",")) else 1  # the first line may name the columns
+        table = np.loadtxt(lines[first:], delimiter=",", comments="#", ndmin=2)
     except (OSError, ValueError) as trouble:
         raise Refusal(f"the field '{path}' cannot be read ({trouble}): give lines x, y, z, value") from None
     if table.shape[1] != 4 or not np.isfinite(table).all():

@@ -134,7 +134,6 @@ class Orthotropic(_Turned):
 
     @property
     def stiffness(self) -> np.ndarray:
-        """(6, 6) [Pa] along its axes, in the order of `compliance`."""
         return np.linalg.inv(self.compliance)
 
 
@@ -156,7 +155,6 @@ class Anisotropic(_Turned):
 
     @property
     def stiffness(self) -> np.ndarray:
-        """(6, 6) [Pa] along its axes."""
         return np.asarray(self.D, dtype=float)
 
 

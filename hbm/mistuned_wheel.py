@@ -31,7 +31,6 @@ class MistunedModel(ReducedModel):
     has_motion_in_time: ClassVar[bool] = False
 
     def at_harmonic(self, h: int) -> NoReturn:
-        """Raise Refusal."""
         raise Refusal("sectors that differ have no system of one harmonic: stability and integration in time need one")
 
 

@@ -69,19 +69,15 @@ class ReductionBasis(Origin):
 
     @property
     def masters(self) -> np.ndarray:
-        """(n_masters,) DOFs of the full system that are coordinates, ascending; they come first."""
         return self.master_dofs
 
     def reconstruct(self, q: np.ndarray) -> np.ndarray:
-        """Full displacement (n_full, ...) [m] of reduced coordinates q (n, ...)."""
         return np.tensordot(self.basis, q, axes=1)
 
     def projected(self, basis: np.ndarray) -> Self:
-        """The origin of coordinates p, q = basis @ p."""
         return replace(self, basis=self.basis @ basis)
 
     def n_full(self, n: int) -> int:
-        """DOFs of the full system."""
         return len(self.basis)
 
 

@@ -65,11 +65,9 @@ class PrescribedModel(ReducedModel):
     has_one_system: ClassVar[bool] = False
 
     def at_harmonic(self, h: int) -> tuple[SecondOrderSystem, np.ndarray]:
-        """System and contact map (n_pair * n_component, n) that harmonic h sees."""
         return (self.static if h == 0 else self.system), np.asarray(self.interface.B)
 
     def with_systems(self, change: SystemChange) -> Self:
-        """The same model with both systems replaced."""
         B = np.asarray(self.interface.B)
         return replace(self, system=change(self.system, B), static=change(self.static, B))
 

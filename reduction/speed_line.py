@@ -210,7 +210,6 @@ class SpeedLineModel(WaveModel):
     follows_frequency: ClassVar[bool] = True
 
     def at_frequency(self, omega: float) -> WaveModel:
-        """The model at the speed that belongs to an excitation frequency [rad/s]."""
         return self.line(omega)
 
     def matches(self, other: ReducedModel, harmonics: Sequence[int]) -> bool:

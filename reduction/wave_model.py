@@ -79,7 +79,6 @@ class WaveModel(ReducedModel):
         return self.index_of(index % self.n_sectors)[:2]
 
     def at_harmonic(self, h: int) -> tuple[SecondOrderSystem, np.ndarray]:
-        """System and contact map (n_pair * n_component, n) that harmonic h sees."""
         return self.at_index(h * self.engine_order)
 
     def shared_systems(self, harmonics: Sequence[int]) -> list[tuple[list[int], list[int]]]:
@@ -105,13 +104,11 @@ class WaveModel(ReducedModel):
         return dict(self.reduced.accuracy)
 
     def reconstruct(self, q: np.ndarray, h: int = 1) -> np.ndarray:
-        """Full displacement (n_full,) or (n_full, k) [m] of small coordinates q (n,) or (n, k) of harmonic h."""
         sector = self.index_of(h * self.engine_order % self.n_sectors)[2] @ q
         basis = self.reduced.origin.basis
         return basis @ sector.real + 1j * (basis @ sector.imag)
 
     def with_systems(self, change: SystemChange) -> Self:
-        """The same wave with the system of every index replaced."""
         return self.with_index_systems(lambda _, system, B: change(system, B))
 
     def with_index_systems(self, change: IndexChange) -> Self:

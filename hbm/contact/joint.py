@@ -201,14 +201,6 @@ class JointSet:
         """Whether a law limits its tangential force."""
         return any(joint.has_friction for joint in self.joints)
 
-    @cached_property
-    def has_component(self) -> np.ndarray:
-        """(n_pair, n_component) whether the law of a pair models a component."""
-        result = np.zeros((self.n_pair, len(self.components)), bool)
-        for joint in self.joints:
-            result[np.ix_(joint.rows, self.columns(joint))] = True
-        return result
-
     @property
     def tangential(self) -> list[int]:
         """Positions of the tangential components, the ones in which friction works."""

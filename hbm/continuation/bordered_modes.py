@@ -33,7 +33,7 @@ class DiagonalBordered:
     """With a diagonal D (n,), as proportional damping has it; one of its entries may vanish where r l is largest."""
 
     def __init__(self, d: np.ndarray, border: np.ndarray, corner: float, row: np.ndarray | None = None):
-        self._d, self._r, self._corner = d, border, corner
+        self._r, self._corner = border, corner
         self._row = border.conj() if row is None else row
         self._pivot = int(np.abs(border * self._row).argmax())
         with np.errstate(divide="ignore", invalid="ignore"):

@@ -91,12 +91,10 @@ class FlexiblePoint(CompliancePoint):
     compliance: FlexibleCompliance
 
     def apply(self, g: np.ndarray) -> np.ndarray:
-        """G g: (n_contact, n_coeff) relative displacement [m] under contact forces g (n_contact, n_coeff) [N]."""
         return self.nearly(g) + self.compliance.residual.apply(g)
 
     @property
     def left_out(self) -> float:
-        """Largest share of the contact flexibility that `nearly` and the products of `jacobian_product` leave out."""
         return self.compliance.residual.left_out
 
     def nearly(self, g: np.ndarray) -> np.ndarray:

@@ -39,11 +39,9 @@ class HeldOutput(ContactCompliance):
         return side
 
     def restricted(self, basis: HarmonicBasis) -> HeldOutput:
-        """The same for fewer of the harmonics."""
         return HeldOutput.of(self.inner.restricted(basis), self.output_names[self.row], self.amplitude)
 
     def at(self, omega: float) -> HeldPoint:
-        """The compliance at one excitation frequency [rad/s]."""
         point = super().at(omega)
         assert isinstance(point, HeldPoint)
         return point
@@ -99,15 +97,12 @@ class HeldPoint(CompliancePoint):
         return (self.compliance.amplitude * factor - self.contact_motion(g)) / self.receptance
 
     def apply(self, g: np.ndarray) -> np.ndarray:
-        """G g."""
         return self._with_fundamental(self.inner.apply(g), -self.contact_motion(g) * self._per_output[0])
 
     def nearly(self, g: np.ndarray) -> np.ndarray:
-        """G g without what needs a solution by a sparse factor."""
         return self._with_fundamental(self.inner.nearly(g), -self.contact_motion(g) * self._per_output[0])
 
     def outputs(self, g: np.ndarray) -> np.ndarray:
-        """(n_output, n_coeff) outputs under contact forces g alone [m]."""
         return self._with_fundamental(self.inner.outputs(g), -self.contact_motion(g) * self._per_output[1])
 
     def slope(self, g: np.ndarray, load_factor: float) -> tuple[np.ndarray, np.ndarray]:

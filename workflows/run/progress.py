@@ -154,7 +154,6 @@ class CallbackProgress(Progress):
         self.say(f"{name}: {time.perf_counter() - start:.1f} s")
 
     def say(self, text: str) -> None:
-        """A sentence."""
         self._callback(text, None)
 
 

@@ -73,7 +73,6 @@ class ByTemperature(Table, stage=CONTACT):
 
     @property
     def numbers(self) -> dict[str, tuple[float, ...]]:
-        """The values of each number of the law."""
         return {name: tuple(values) for name, values in (self.model_extra or {}).items()}
 
     def at(self, temperature: float) -> dict[str, float]:

@@ -164,5 +164,4 @@ class MatrixScene(Scene):
 
     @property
     def joints(self) -> dict[str, DofContact]:
-        """The one contact by its name."""
         return {"contact": self.contact}

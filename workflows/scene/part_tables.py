@@ -60,7 +60,6 @@ class Meshed(Table, stage=PART):
 
     @property
     def numbers(self) -> dict[str, int | float]:
-        """The parameters of its part."""
         return self.parameters
 
     @property

@@ -178,7 +178,6 @@ class MeshScene(Scene):
 
     @property
     def joints(self) -> dict[str, FaceContact]:
-        """The contacts by name."""
         return {**({} if self.contact is None else {"contact": self.contact}), **self.contacts}
 
     @model_validator(mode="before")

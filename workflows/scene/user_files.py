@@ -143,10 +143,8 @@ class LawTable(Table):
 
     @property
     def usual_ranges(self) -> dict[str, UsualRange]:
-        """The usual range of each number of the law that declares one."""
         return {number.name: UsualRange(*number.usual, number.unit or "") for number in self._declared if number.usual}
 
     @property
     def numbers(self) -> dict[str, float]:
-        """The numbers of the law, in the units that it declares."""
         return dict(self.model_extra or {})

@@ -33,7 +33,6 @@ class WheelScene(MeshScene):
 
     @property
     def other_speeds(self) -> tuple[float, ...]:
-        """Speeds of the wheel [Hz] in duties of the mission, without that of the wheel itself."""
         mission = () if self.wear is None else self.wear.mission
         return tuple(sorted({duty.speed for duty in mission if duty.speed is not None} - {self.wheel.speed}))
 

@@ -72,12 +72,10 @@ class Draft(StudyResult):
     candidates: tuple[Candidate, ...]
 
     def record(self) -> dict[str, Any]:
-        """For machines."""
         pairs = [vars(candidate) for candidate in self.candidates]
         return {"unit": self.unit, "bodies": dict(self.bodies), "candidates": pairs, "scene": self.text}
 
     def lines(self) -> list[str]:
-        """For people."""
         texts = [f"unit      {self.unit}: {self.unit_reason}"]
         texts += [f"body      {name}: groups {', '.join(groups) or 'none'}" for name, groups in self.bodies.items()]
         texts += [f"contact   {_describe(candidate)}" for candidate in self.candidates]

@@ -57,7 +57,6 @@ class Forces(StudyResult):
     bodies: tuple[BodyForces, ...]
 
     def record(self) -> dict[str, Any]:
-        """For machines."""
         return {
             body.name: {
                 "load_N": body.load.tolist(),
@@ -69,7 +68,6 @@ class Forces(StudyResult):
         }
 
     def lines(self) -> list[str]:
-        """For people."""
         texts = []
         for body in self.bodies:
             texts.append(f"{body.name}: static load {_vector(body.load)} N")

@@ -53,7 +53,6 @@ class Inspection(StudyResult):
     remarks: tuple[str, ...] = ()
 
     def record(self) -> dict[str, Any]:
-        """For machines."""
         return {
             "size_m": self.size.tolist(),
             "mass_kg": self.mass,
@@ -72,7 +71,6 @@ class Inspection(StudyResult):
         }
 
     def lines(self) -> list[str]:
-        """For people."""
         mass = "not known, no density is given" if self.mass is None else f"{self.mass:.6g} kg"
         lines = [
             ("size", " x ".join(f"{1e3 * x:.6g}" for x in self.size) + " mm"),

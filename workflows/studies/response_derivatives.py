@@ -84,7 +84,6 @@ class ResponseDerivatives(StudyResult):
         return tuple(key for key, c in zip(self.derivatives.parameters, self.derivatives.corner, strict=True) if c)
 
     def record(self) -> dict[str, Any]:
-        """For machines, SI units."""
         f = self.derivatives
         return {
             "quantities": dict(zip(f.names, f.values.tolist(), strict=True)),

@@ -29,7 +29,6 @@ class FaceAsperities(StudyResult):
     rows: int
 
     def record(self) -> dict[str, Any]:
-        """For machines."""
         asperities = self.asperities
         return {
             "summits": len(asperities.height),

@@ -125,7 +125,6 @@ class TimeComparison(StudyResult):
         }
 
     def lines(self) -> list[str]:
-        """For people."""
         record = self.record()
         worn = "unworn" if self.row is None else f"worn as in row {self.row}"
         harmonics = ", ".join(map(str, record["harmonics"]))

@@ -11,7 +11,6 @@ none fits better by more than that."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from scipy.optimize import least_squares
@@ -92,17 +91,6 @@ class Fit:
             ]
             lines.append(f"{mode + 1:4d}" + "".join(cells))
         return "\n".join(line.rstrip() for line in lines)
-
-    def record(self) -> dict[str, Any]:
-        """Ratios, errors and dimensions for machines."""
-        columns = {}
-        for name, ours, errors in zip(PUBLISHED, self.columns / self.unit, self.errors, strict=True):
-            rows = [error if ratio else None for ratio, error in zip(PUBLISHED[name], errors.tolist(), strict=True)]
-            columns[name] = {"published": PUBLISHED[name], "ours": ours.tolist(), "error": rows}
-        return {
-            "columns": columns, "rms": self.rms, "unit_hz": self.unit, "pin_N_per_m": self.spring,
-            "contact_N_per_m": self.contact, "geometry": dict(self.parameters),
-        }  # fmt: skip
 
     def toml(self) -> str:
         """Lines for the scene."""

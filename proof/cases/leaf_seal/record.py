@@ -1,10 +1,6 @@
-"""What is kept of one configuration of the leaf seal's study, to resume a stopped study and to draw it again."""
+"""What is kept of one configuration of the leaf seal's study: its row of the table and its curve."""
 
-import json
-import re
-import zipfile
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -13,8 +9,6 @@ from proof.cases.leaf_seal.cases import Case
 from proof.cases.leaf_seal.response import LINER_NODE, LeafResponse
 from tribodyn.hbm.contact.contact_law import SEPARATES, STICKS
 from tribodyn.hbm.outcome import BranchEnd
-from tribodyn.output_file import replacing as write_whole
-from tribodyn.workflows.scene.schema import Scene
 
 COLUMNS = (
     "group", "value", "points", "folds", "fold_hz", "unstable_points", "peak_hz", "peak_um",
@@ -31,7 +25,7 @@ class Record:
 
     numbers : of COLUMNS; only group, value and end where nothing was solved
     frequency : (n_point,) [Hz]; amplitude : (n_point,) [m]; stable : (n_point,) bool
-    response : None where the record was read from a file"""
+    response : None where it is not drawn: a model is some megabytes"""
 
     case: Case
     numbers: dict[str, Any]
@@ -93,36 +87,3 @@ def row(case: Case, response: LeafResponse) -> dict[str, Any]:
             strict=True,
         )
     )
-
-
-def file_of(case: Case, folder: Path) -> Path:
-    """Where the record of a configuration is kept."""
-    word = re.sub(r"[^0-9a-zA-Z+-]+", "_", f"{case.group} {case.label}").strip("_")
-    return folder / f"{word}.npz"
-
-
-def save(record: Record, scene: Scene, folder: Path) -> None:
-    """Write a record; a kill at any moment leaves the old file or the new one."""
-    path = file_of(record.case, folder)
-    path.parent.mkdir(parents=True, exist_ok=True)
-    with write_whole(path) as updated, updated.open("wb") as file:
-        np.savez(
-            file,
-            scene=scene.model_dump_json(),
-            numbers=json.dumps(record.numbers),
-            frequency=record.frequency,
-            amplitude=record.amplitude,
-            stable=record.stable,
-        )
-
-
-def load(case: Case, scene: Scene, folder: Path) -> Record | None:
-    """The record of a configuration as it is kept; None where there is none of the same scene."""
-    try:
-        with np.load(file_of(case, folder)) as loaded:
-            if str(loaded["scene"]) != scene.model_dump_json():
-                return None
-            numbers = json.loads(str(loaded["numbers"]))
-            return Record(case, numbers, loaded["frequency"], loaded["amplitude"], loaded["stable"])
-    except (OSError, KeyError, ValueError, zipfile.BadZipFile):
-        return None

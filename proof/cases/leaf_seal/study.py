@@ -1,15 +1,13 @@
 """The parameter study of the leaf seal: ./tribodyn prove leaf study.
 
 Some thirty configurations, one response curve each, with folds, stability and chattering; a table, the summary of all
-curves, and for the scene itself the pictures of the thesis. A configuration that fails is told and left behind; every
-one that is done is kept, so that a stopped study can be resumed."""
+curves, and for the scene itself the pictures of the thesis. A configuration that fails is told and left behind."""
 
 import csv
 import time
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 from matplotlib.figure import Figure
 from threadpoolctl import threadpool_limits
@@ -24,7 +22,6 @@ from tribodyn.workflows.scene.scene_file import read_scene
 
 MAPS = ("inclination", "bow")  # parameters whose contact is drawn
 LINEAR_POINT = 4  # of the chosen five
-RECORDS = "configurations"  # folder of the records
 
 
 def sizes(response: LeafResponse) -> str:
@@ -50,21 +47,13 @@ def solve(case: Case) -> Record:
         return leaf_record.of_failure(case, " ".join(str(error).split()))
 
 
-def study(
-    chosen: Sequence[Case], folder: Path, resume: bool = False, tell: Callable[[str], None] = lambda line: None
-) -> list[Record]:
-    """Solve configurations; each is kept and told as soon as it is done.
-
-    resume : take from the folder what is complete there and of the same scene"""
+def study(chosen: Sequence[Case], folder: Path, tell: Callable[[str], None]) -> list[Record]:
+    """Solve configurations; each is in the table and told as soon as it is done."""
     records: list[Record] = []
     for case in chosen:
-        scene = read_scene("leaf_seal_thesis", case.overrides).scene
-        saved = leaf_record.load(case, scene, folder / RECORDS) if resume else None
-        record = saved if saved is not None and saved.complete else solve(case)
-        if record is not saved:
-            leaf_record.save(record, scene, folder / RECORDS)
+        record = solve(case)
         drawn = case.group in MAPS or not records
-        records.append(record if drawn else replace(record, response=None))  # a model is some megabytes
+        records.append(record if drawn else replace(record, response=None))
         write_table(records, folder / "study.csv")
         tell("  ".join(f"{record.numbers.get(name, '')!s:{_width(name)}}" for name in COLUMNS))
     return records
@@ -86,7 +75,7 @@ def draw(records: Sequence[Record], folder: Path) -> list[Path]:
     """Write the pictures of a study and the chattering of every pair at the chosen points."""
     figures: dict[str, Figure] = {"summary": leaf_figures.summary_figure(records)}
     paths = []
-    scene = _response(records[0])
+    scene = records[0].response
     if scene is not None:
         low, high = scene.branch.frequency[[0, -1]]
         points = scene.chosen()
@@ -100,8 +89,7 @@ def draw(records: Sequence[Record], folder: Path) -> list[Path]:
         columns = []
         of_group = [record for record in records if record.case.group == group]
         for record in of_group[:: len(of_group) - 1 or 1]:  # the extremes
-            response = _response(record)
-            if response is not None:
+            if (response := record.response) is not None:
                 for name, point in (("beyond resonance", LINEAR_POINT), ("largest motion", STRUCK_POINT)):
                     columns.append((f"{record.case.label}: {name}", response, response.chosen()[point]))
         if columns:
@@ -110,11 +98,6 @@ def draw(records: Sequence[Record], folder: Path) -> list[Path]:
         paths.append(folder / f"{name}.png")
         figure.savefig(paths[-1])
     return paths
-
-
-def _response(record: Record) -> LeafResponse | None:
-    """The response of a record, solved again where it was read from a file; None where there is none."""
-    return solve(record.case).response if record.response is None and record.complete else record.response
 
 
 def write_chatter(response: LeafResponse, points: Sequence[int], path: Path) -> None:
@@ -140,49 +123,21 @@ def write_chatter(response: LeafResponse, points: Sequence[int], path: Path) -> 
                 )
 
 
-@dataclass(frozen=True)
-class Study:
-    """A whole study. allocated : of `sizes`; files : that were written; totals : counts and seconds by name."""
-
-    records: list[Record]
-    allocated: str
-    files: list[Path]
-    totals: dict[str, float]
-
-    def record(self) -> dict[str, Any]:
-        """For machines."""
-        rows, files = [record.numbers for record in self.records], [str(path) for path in self.files]
-        return {"rows": rows, **self.totals, "sizes": self.allocated, "files": files}
-
-    def text(self) -> str:
-        """For people, below the table that was told on the way."""
-        total = self.totals
-        return "\n".join(
-            [
-                self.allocated,
-                *(str(path) for path in self.files),
-                f"{total['configurations']} configurations, {total['incomplete']} incomplete; models and curves "
-                f"{total['curve_seconds']} s of processor time, with stability and pictures "
-                f"{total['processor_seconds']} s, {total['seconds']} s by the clock",
-            ]
-        )
-
-
-def whole(folder: Path, resume: bool, tell: Callable[[str], None]) -> Study:
-    """Run the whole study into a folder. tell : called with the rows of its table as they come."""
+def whole(folder: Path, tell: Callable[[str], None]) -> None:
+    """Run the whole study into a folder. tell : called with the rows of its table as they come, and what it came to."""
     started, clock = time.perf_counter(), time.process_time()
     folder.mkdir(parents=True, exist_ok=True)
     tell("  ".join(f"{name:{_width(name)}}" for name in COLUMNS))
     with threadpool_limits(1):
-        records = study(cases(read_scene("leaf_seal_thesis").mesh_scene), folder, resume, tell)
-        first = _response(records[0])
-        paths = draw([replace(records[0], response=first), *records[1:]], folder)
-        allocated = "" if first is None else sizes(first)
-    total = {
-        "configurations": len(records),
-        "incomplete": sum(not record.complete for record in records),
-        "curve_seconds": round(sum(record.numbers.get("seconds", 0.0) for record in records), 1),
-        "seconds": round(time.perf_counter() - started, 1),
-        "processor_seconds": round(time.process_time() - clock, 1),
-    }
-    return Study(records, allocated, paths, total)
+        records = study(cases(read_scene("leaf_seal_thesis").mesh_scene), folder, tell)
+        paths = draw(records, folder)
+    if (first := records[0].response) is not None:
+        tell(sizes(first))
+    for path in paths:
+        tell(str(path))
+    tell(
+        f"{len(records)} configurations, {sum(not record.complete for record in records)} incomplete; models and "
+        f"curves {sum(record.numbers.get('seconds', 0.0) for record in records):.1f} s of processor time, with "
+        f"stability and pictures {time.process_time() - clock:.1f} s, "
+        f"{time.perf_counter() - started:.1f} s by the clock"
+    )

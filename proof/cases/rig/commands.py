@@ -1,11 +1,10 @@
 """Words of `prove` that serve the fretting rig: prove rig."""
 
-import json
 from pathlib import Path
 from typing import Literal
 
 from proof.words import report_progress
-from tribodyn.workflows.command.word import Flag, Json, Overrides, make_room
+from tribodyn.workflows.command.word import Flag, Overrides, make_room
 
 
 def rig(
@@ -16,7 +15,6 @@ def rig(
     wear: Flag = False,
     overrides: Overrides = (),
     out: Path | None = None,
-    as_json: Json = False,
 ) -> None:
     """Of the fretting rig: fits of what is not published, and its comparison with the published experiment.
 
@@ -33,19 +31,13 @@ def rig(
     wear
         fit: the wear coefficient too, from a whole wear run, minutes.
     out
-        study: folder of table and pictures; results/rig_study by default.
-    as_json
-        Print JSON for machines."""
+        study: folder of table and pictures; results/rig_study by default."""
     from proof.cases.rig import fit as rig_fit, study as rig_study, table as rig_table
 
     if work == "fit":
-        fits = rig_fit.run(scene, overrides, column, wear, report_progress)
-        print(json.dumps(rig_fit.as_records(fits), indent=2) if as_json else rig_fit.as_text(fits))
+        print(rig_fit.as_text(rig_fit.run(scene, overrides, column, wear, report_progress)))
         return
     make_room(out)
     table, paths = rig_study.run(scene, overrides, out or Path("results") / "rig_study", report_progress)
-    if as_json:
-        print(json.dumps({**rig_table.as_records(table), "files": [str(path) for path in paths]}, indent=2))
-    else:
-        print(rig_table.as_text(table))
-        print(*paths, sep="\n")
+    print(rig_table.as_text(table))
+    print(*paths, sep="\n")

@@ -139,8 +139,3 @@ def _coefficient(rig: Rig, file: SceneFile, tell: Callable[[str], None]) -> Iden
 def as_text(fits: Mapping[str, Identification]) -> str:
     """All reports."""
     return "\n\n".join(f"{title}\n{identification.report()}" for title, identification in fits.items())
-
-
-def as_records(fits: Mapping[str, Identification]) -> dict[str, object]:
-    """All reports for machines."""
-    return {title: identification.record() for title, identification in fits.items()}

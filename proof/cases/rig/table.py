@@ -1,7 +1,7 @@
 """One table of the fretting rig: every published number and trend, and ours."""
 
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -258,10 +258,3 @@ def as_text(table: Table) -> str:
         )
     lines += ["", f"{table.seconds:.0f} s of processor time, one thread"]
     return "\n".join(lines) + "\n"
-
-
-def as_records(table: Table) -> dict[str, object]:
-    """For machines."""
-    numbers = [{**asdict(n), "difference": n.difference} for n in table.numbers]
-    return {"numbers": numbers, "trends": [asdict(t) for t in table.trends],
-            "checks": [asdict(c) for c in table.checks], "seconds": table.seconds}  # fmt: skip

@@ -98,7 +98,6 @@ class SceneBackbone(StudyResult):
         return rows
 
     def lines(self) -> list[str]:
-        """For people."""
         hertz, damping = self.mode.frequency, 100 * self.mode.damping
         return named_lines(
             [

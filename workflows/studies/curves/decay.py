@@ -79,7 +79,6 @@ class Decay(StudyResult):
         }
 
     def lines(self) -> list[str]:
-        """For people."""
         texts = self.record()
         first, last = texts["rows"][0], texts["rows"][-1]
         off = {name: texts[f"largest_{name}_difference"] for name in ("frequency", "decrement", "damping")}

@@ -35,11 +35,9 @@ class Fit(StudyResult):
     changes: tuple[str, ...]
 
     def record(self) -> dict[str, Any]:
-        """For machines."""
         return {**self.identification.record(), "set": list(self.changes)}
 
     def lines(self) -> list[str]:
-        """For people."""
         sets = [f'  --set "{change}"' for change in self.changes]
         return [self.identification.report(), "", "to continue with what was found:", *sets]
 

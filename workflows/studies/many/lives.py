@@ -65,7 +65,6 @@ class LifeDistribution(StudyResult):
     weights: np.ndarray
 
     def record(self) -> dict[str, Any]:
-        """Plain data for machines."""
         names = ("name", "number", "confidence", "runs", "open", "missing", "scaled", "explained", "scatter",
                "logarithmic", "model_error", "model_error_of")  # fmt: skip
         return {
@@ -75,7 +74,6 @@ class LifeDistribution(StudyResult):
         }
 
     def lines(self) -> list[str]:
-        """For people."""
         runs = f"{self.runs} runs" + (f" ({self.open} of them survived, or ended before)" if self.open else "")
         source = "not known: " + self.model_error_of if self.model_error is None else self.model_error_of
         error = "" if self.model_error is None else f"{100 * self.model_error:.2g} %, "
@@ -98,7 +96,6 @@ class LifeDistribution(StudyResult):
 
     @property
     def defects(self) -> list[str]:
-        """Runs that a defect of the program stopped."""
         return self.table.defects
 
     @property

@@ -63,7 +63,6 @@ class Optimum(StudyResult):
         return {"run": int(self.table.columns[RUN][row]), "keys": self.keys(row), **self.values(row), "at_least": least}
 
     def record(self) -> dict[str, Any]:
-        """Plain data for machines."""
         return {
             "name": self.name,
             "aims": [aim.model_dump() for aim in self.aims],
@@ -74,7 +73,6 @@ class Optimum(StudyResult):
         }
 
     def lines(self) -> list[str]:
-        """For people."""
         aims_text = ", ".join(f"{aim.number} {aim.want}" for aim in self.aims)
         texts = [f"{len(self.table.columns[RUN])} runs, {self.table.count('complete')} complete; wanted: {aims_text}"]
         if len(self.aims) > 1:
@@ -95,7 +93,6 @@ class Optimum(StudyResult):
 
     @property
     def defects(self) -> list[str]:
-        """Runs that a defect of the program stopped."""
         return self.table.defects
 
     @property

@@ -126,7 +126,6 @@ class StudyTable(StudyResult):
 
     @property
     def defects(self) -> list[str]:
-        """Runs that a defect of the program stopped, with type and place."""
         stopped = np.flatnonzero(self.columns[STATUS] == "defect")
         return [f"run {self.columns[RUN][i]}: {self.columns[SENTENCE][i]}" for i in stopped]
 

@@ -118,7 +118,6 @@ class MeasurementComparison(StudyResult):
         return peaks_of_runs
 
     def record(self) -> dict[str, Any]:
-        """For machines, SI units; what is not known is None."""
         rows = [{n: None if v != v else v for n, v in row.items()} for row in self.rows()]
         return {
             "scene": self.name, "measurement": self.measured.source, "kind": self.measured.kind, "rows": rows,

@@ -54,7 +54,6 @@ class MeasuredLoops(StudyResult):
         return max(self.runs.values(), key=lambda run: run.numbers["sliding"])
 
     def record(self) -> dict[str, Any]:
-        """For machines, SI units; what a loop does not determine is None."""
 
         def known(value: float) -> float | None:
             return value if np.isfinite(value) else None
@@ -69,7 +68,6 @@ class MeasuredLoops(StudyResult):
         return {"measurement": self.source, "runs": runs}
 
     def lines(self) -> list[str]:
-        """For people."""
         lines = []
         for name, run in self.runs.items():
             cycles, (x, force) = run.loop.cycles, run.loop.cycles.drift

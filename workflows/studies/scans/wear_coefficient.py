@@ -34,7 +34,6 @@ class WearCoefficient:
         return self.value - self.factor * self.error, self.value + self.factor * self.error
 
     def record(self) -> dict[str, Any]:
-        """For machines."""
         low, high = self.interval
         numbers = {
             "value_m3_per_J": self.value, "error_m3_per_J": self.error, "low_m3_per_J": low, "high_m3_per_J": high,
@@ -49,7 +48,6 @@ class WearCoefficient:
         return f"95 %: {low:.4g} to {high:.4g}, of {of}"
 
     def lines(self) -> list[str]:
-        """For people."""
         rows = [("coefficient", f"{1e18 * self.value:.4g} um3/J, {self._range()}")]
         if np.isfinite(self.slope) and abs(self.offset) > self.factor * self.offset_error:
             note = f"{1e9 * self.offset:.3g} mm³ at no work, slope {1e18 * self.slope:.4g} um3/J: running-in?"

@@ -65,7 +65,6 @@ class WornScans(StudyResult):
         return {name: [row.get(name, np.nan) for row in rows] for name in names}
 
     def record(self) -> dict[str, Any]:
-        """For machines, SI units; what is not known is None."""
         columns = self.columns()
         rows = [dict(zip(columns, row, strict=True)) for row in zip(*columns.values(), strict=True)]
         return {
@@ -88,7 +87,6 @@ class WornScans(StudyResult):
         ]
 
     def lines(self) -> list[str]:
-        """For people."""
         head = ("volume", "95 %", "worn area", "deepest", "noise", "shift", "turn", "missing")
         table = [f"{'test':18}" + "".join(f"{word:>16}" for word in head)]
         for test in self.tests:

@@ -45,7 +45,6 @@ class Flutter(StudyResult):
         return {index: -value.real / abs(value) for index, value in self.eigenvalues.items()}
 
     def record(self) -> dict[str, Any]:
-        """For machines."""
         return {
             "waves": [
                 {"index": j, "hz": value.imag / (2 * np.pi), "damping": self.damping[j]}
@@ -60,7 +59,6 @@ class Flutter(StudyResult):
         }
 
     def lines(self) -> list[str]:
-        """For people."""
         texts = [
             f"wave {j:3}: {value.imag / (2 * np.pi):.6g} Hz, damping {self.damping[j]:+.4%}"
             + (", flutters" if value.real > 0 else "")

@@ -36,7 +36,6 @@ class PatternRun(StudyRun):
 
     @property
     def key(self) -> str:
-        """Hash of all that the row depends on."""
         return f"{super().key} {self.number}"
 
 
@@ -92,7 +91,6 @@ class Patterns(StudyResult):
         return np.array([row.numbers[name] for row in self.complete])
 
     def record(self) -> dict[str, object]:
-        """For machines."""
         amplifications = self.column("amplification")
         if not len(amplifications):
             return {"patterns": len(self.rows), "complete": 0}
@@ -113,7 +111,6 @@ class Patterns(StudyResult):
         }
 
     def lines(self) -> list[str]:
-        """For people."""
         summary = self.record()
         lines = [f"{summary['complete']} of {summary['patterns']} patterns of {self.n_sectors} blades solved"]
         lines += [f"pattern {row.run}: {row.status}, {row.sentence}" for row in self.rows if row.status != "complete"]
@@ -130,7 +127,6 @@ class Patterns(StudyResult):
 
     @property
     def defects(self) -> list[str]:
-        """Patterns that a defect of the program stopped."""
         return [f"pattern {row.run}: {row.sentence}" for row in self.rows if row.status == "defect"]
 
     @property

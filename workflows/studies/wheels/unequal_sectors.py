@@ -55,7 +55,6 @@ class MistunedSectors(StudyResult):
         return float(curves[0].max() / curves[1].max()) if has_peaks else None
 
     def record(self) -> dict[str, object]:
-        """For machines."""
         worst = int(np.argmax(self.heights.max(axis=0)))
         return {
             "stiffness": self.stiffness.tolist(),
@@ -67,7 +66,6 @@ class MistunedSectors(StudyResult):
         }
 
     def lines(self) -> list[str]:
-        """For people."""
         ratio = self.amplification
         lines = [
             "factors on the stiffness: " + ", ".join(f"{factor:.4f}" for factor in self.stiffness),

@@ -59,7 +59,6 @@ class WheelModes(StudyResult):
         return figures
 
     def record(self) -> dict[str, Any]:
-        """What was found, for machines."""
         return {
             "sectors": self.n_sectors,
             "families_hz": {state: values.tolist() for state, values in self.families.items()},
@@ -68,7 +67,6 @@ class WheelModes(StudyResult):
         }
 
     def lines(self) -> list[str]:
-        """What was found, for people."""
         texts = []
         for state, values in self.families.items():
             if np.isnan(values).all():
