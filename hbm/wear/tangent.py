@@ -35,7 +35,7 @@ from tribodyn.hbm.threads import single
 from tribodyn.hbm.wear.harmonic_fallback import top_harmonic
 from tribodyn.hbm.wear.history import LARGEST_SHIFT, LIFE_SHARE, StepScheme, WearHistory, WearRow, cycles_to_preload
 from tribodyn.hbm.wear.implicit_stage import WearingBalance
-from tribodyn.hbm.wear.preload_at_rest import PreloadAtRest
+from tribodyn.hbm.wear.run_end import PreloadAtRest
 from tribodyn.hbm.wear.sdirk_stages import GAMMA, FrequencySearch, initial_guess, solve_first_stage
 from tribodyn.hbm.wear.step_memory import StepMemory
 from tribodyn.hbm.wear.wear_problem import WearProblem, WearState, assess, wear_of

@@ -8,8 +8,7 @@ import numpy as np
 from tribodyn.hbm.outcome import WearEnd
 from tribodyn.hbm.threads import single
 from tribodyn.hbm.wear.history import WearHistory, WearRow, history, rows_to_resume
-from tribodyn.hbm.wear.preload_at_rest import PreloadAtRest
-from tribodyn.hbm.wear.run_end import reason_to_stop
+from tribodyn.hbm.wear.run_end import PreloadAtRest, reason_to_stop
 from tribodyn.hbm.wear.wear_problem import WearState, assess
 from tribodyn.hbm.wear.wear_rows import state_of
 from tribodyn.hbm.wear.wear_rule import WearRule, WearStep

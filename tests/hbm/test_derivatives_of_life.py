@@ -17,8 +17,8 @@ from tribodyn.hbm.derivatives.derivative_rules import NoDerivative
 from tribodyn.hbm.derivatives.parameter_change import BalanceInputs, ParameterChange
 from tribodyn.hbm.wear import tangent
 from tribodyn.hbm.wear.law import JointWear
-from tribodyn.hbm.wear.preload_at_rest import PreloadAtRest
 from tribodyn.hbm.wear.rules import error_controlled, thesis
+from tribodyn.hbm.wear.run_end import PreloadAtRest
 from tribodyn.hbm.wear.step_control import Tolerance
 from tribodyn.hbm.wear.wear_loop import evolve
 from tribodyn.hbm.wear.wear_problem import Duty, WearProblem, assess

@@ -24,7 +24,7 @@ from tribodyn.workflows.errors.judgement import total_error
 from tribodyn.workflows.errors.ladders import limit_of
 from tribodyn.workflows.errors.operating_states import relative_change
 from tribodyn.workflows.result.verdict import MeasuredChange, Refinement
-from tribodyn.workflows.run import modelling, scene_loads
+from tribodyn.workflows.run import scene_loads
 from tribodyn.workflows.run.references import delta_max
 from tribodyn.workflows.scene import scene_file
 from tribodyn.workflows.scene.load_tables import StaticLoad
@@ -147,7 +147,7 @@ def test_the_ground_moves_ahead_by_its_phase() -> None:
     moves = SimpleNamespace(static=0.0, harmonic=2.0, phase=0.3, direction=(1.0, 0.0, 0.0))
     scene = SimpleNamespace(motion={"foot": moves})
     part = SimpleNamespace(interface=interface, pairs={"foot": slice(0, 1)})
-    computed = modelling.ground_motion(scene, part, HarmonicBasis((0, 1)))
+    computed = scene_loads.ground_motion(scene, part, HarmonicBasis((0, 1)))
     np.testing.assert_allclose(computed[0], [0.0, 2 * np.cos(0.3), -2 * np.sin(0.3)], atol=1e-15)
 
 

@@ -21,8 +21,7 @@ from tribodyn.geometry import subdivision
 from tribodyn.geometry.sources import added_nodes, deck, face_rules, foreign_file
 from tribodyn.geometry.sources.directions import Directions
 from tribodyn.refusal import Refusal
-from tribodyn.workflows.run.deck_materials import material
-from tribodyn.workflows.run.deck_source import elements_of, notes_of, source, with_elements
+from tribodyn.workflows.run.deck_bodies import elements_of, material, notes_of, source, with_elements
 from tribodyn.workflows.scene.structure_tables import EVERYTHING, DeckTable as Table
 
 UNITS = {metres: name for name, (metres, _) in foreign_file.UNITS.items()}

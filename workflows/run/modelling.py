@@ -37,7 +37,6 @@ from tribodyn.workflows.run import (
 )
 from tribodyn.workflows.run.contact_surfaces import mapped_gap, surface_gap
 from tribodyn.workflows.run.damping_matrices import damping_matrix
-from tribodyn.workflows.run.ground_motion import ground_motion
 from tribodyn.workflows.run.preloaded_state import preloaded
 from tribodyn.workflows.run.progress import Progress
 from tribodyn.workflows.run.sanity_checks import check_size
@@ -254,7 +253,7 @@ class Problem:
             raise Refusal("the contact has gaps, which act in harmonic 0: keep it in harmonics.kept")
         base = None
         if isinstance(scene, MeshScene) and self.part is not None:
-            base = ground_motion(scene, self.part, basis)
+            base = scene_loads.ground_motion(scene, self.part, basis)
         excitation = joints.excite(scene, base)
         bolts = {(0, name): force for name, force in self.bolts.items()}
         excitation = replace(excitation, loads={**excitation.loads, **bolts})

@@ -22,7 +22,7 @@ from tribodyn.reduction.model import ReducedModel, ReductionBasis
 from tribodyn.reduction.relative import body_1_dofs, relative
 from tribodyn.reduction.sensitivity import Sensitivity
 from tribodyn.refusal import Refusal
-from tribodyn.workflows.run import joints, matrix_model, modelling, part_reduction, scene_assembly
+from tribodyn.workflows.run import joints, matrix_model, modelling, part_reduction, scene_assembly, scene_loads
 from tribodyn.workflows.run.part_changes import difference, moves_evenly, scaled
 from tribodyn.workflows.run.progress import Progress
 from tribodyn.workflows.run.scene_numbers import is_loaded_alike, is_seen_by_contact, moves_nodes, with_value
@@ -136,7 +136,7 @@ class ParameterVariation:
             return replace(BalanceInputs.of(balance), balance=balance)
         base = None
         if isinstance(scene, MeshScene) and part is not None:
-            base = modelling.ground_motion(scene, part, self.model.balance.basis)
+            base = scene_loads.ground_motion(scene, part, self.model.balance.basis)
         contact = self._contact(key, value) if is_seen_by_contact(number) and plain is self.plain else self.base.contact
         loads = self.base.excitation if number.stage is CONTACT else joints.excite(scene, base)
         return BalanceInputs(reduced, contact, loads, self.base.memory, same_coordinates=self.is_linear(key))

@@ -22,7 +22,7 @@ from tribodyn.reduction.sector_reduction import wave_frequencies
 from tribodyn.refusal import Refusal
 from tribodyn.workflows.pictures import groups as group_pictures
 from tribodyn.workflows.result.number_format import named_lines
-from tribodyn.workflows.run import deck_materials, deck_source, decks, modelling, sanity_checks, scene_assembly, sector
+from tribodyn.workflows.run import deck_bodies, decks, modelling, sanity_checks, scene_assembly, sector
 from tribodyn.workflows.run.progress import Progress
 from tribodyn.workflows.scene import scene_file
 from tribodyn.workflows.scene.fields import Number, Pressure, quantity
@@ -151,20 +151,20 @@ def _of_file(
     path: Path, unit: str, elements: Any, material: Material | None, n_modes: int, free: bool, progress: Progress
 ) -> Inspection:
     with progress.stage("reading"):
-        source = deck_source.source(path, unit)
+        source = deck_bodies.source(path, unit)
     named = {"given": material} if material is not None else {}
     material_name = next(iter(named), None)
     table = DeckTable(file=path.name, unit=sources.UNITS[unit][0], material=material_name, elements=elements)
     solids, lacking = [], ""
     for name, body in source.bodies.items():
-        form = deck_source.elements_of(source, table, name)
-        mesh, node_sets = deck_source.with_elements(body.mesh, dict(body.node_sets), form, name)
+        form = deck_bodies.elements_of(source, table, name)
+        mesh, node_sets = deck_bodies.with_elements(body.mesh, dict(body.node_sets), form, name)
         try:
-            material_of_body = deck_materials.material(source.deck, name, mesh, table, named, form)
+            material_of_body = deck_bodies.material(source.deck, name, mesh, table, named, form)
         except Refusal as sentence:  # no or no whole material
             material_of_body, lacking = {}, str(sentence)
         solids.append(Body(name, mesh, node_sets, material_of_body))
-    inspection = measured(solids, deck_source.notes_of(source, table), source.unused)
+    inspection = measured(solids, deck_bodies.notes_of(source, table), source.unused)
     pairs, separate, remarks = _pairs_of(source.deck, solids)
     ignored = (f"{clause}, which a scene has to ignore by name" for clause in source.refused.values())
     inspection = replace(inspection, pairs=pairs, refused=(*ignored, *separate))

@@ -7,6 +7,9 @@ import numpy as np
 from scipy.stats import t as student
 
 from tribodyn.refusal import Refusal
+from tribodyn.workflows.pictures.figures import axes_of
+from tribodyn.workflows.pictures.matplotlib_names import Figure
+from tribodyn.workflows.pictures.theme import BLUE, ORANGE
 from tribodyn.workflows.result.number_format import named_lines
 
 
@@ -57,6 +60,20 @@ class WearCoefficient:
     def keys(self) -> list[str]:
         """Table of a scene."""
         return ["[wear]", 'law = "energy"', f'coefficient = "{1e18 * self.value:.5g} um3/J"  # {self._range()}']
+
+    def plot(self) -> Figure:
+        """Worn volume of every test over its friction work, with the line through zero and its 95 % interval."""
+        work = np.array([0.0, 1.05 * self.work.max()])
+        with axes_of() as (figure, axes):
+            error = 1.96e9 * self.deviation if self.deviation.any() else None
+            axes.errorbar(self.work, 1e9 * self.volume, error, fmt="o", color=ORANGE, capsize=3, label="tests, 95 %")
+            axes.plot(work, 1e9 * self.value * work, color=BLUE, label=f"{1e18 * self.value:.4g} µm³/J")
+            low, high = self.interval
+            label = "95 % of the slope" if len(self.work) > 1 else "95 %, without the scatter between tests"
+            axes.fill_between(work, 1e9 * low * work, 1e9 * high * work, color=BLUE, alpha=0.15, lw=0, label=label)
+            axes.set(xlabel="friction work / J", ylabel="worn volume / mm³", xlim=(0, None), title="Wear coefficient")
+            axes.legend()
+        return figure
 
 
 def regression(work: np.ndarray, volume: np.ndarray, deviation: np.ndarray) -> WearCoefficient:

@@ -9,12 +9,15 @@ from typing import Annotated, Any, Literal
 import numpy as np
 
 from tribodyn.geometry import height_map_files
-from tribodyn.geometry.height_map import HeightMap, mirrored
+from tribodyn.geometry.height_map import HeightMap, centred, level, mirrored
 from tribodyn.geometry.scan_alignment import SmoothMap, blocks
 from tribodyn.geometry.worn_volume import WornFace, compare_scans
 from tribodyn.output_file import write_text
 from tribodyn.refusal import Refusal
 from tribodyn.text_file import text_of
+from tribodyn.workflows.pictures.figures import axes_of, length_unit
+from tribodyn.workflows.pictures.matplotlib_names import Figure
+from tribodyn.workflows.pictures.theme import BLUE, GREY, ORANGE, WEAR_MAP
 from tribodyn.workflows.result.number_format import measured, named_lines
 from tribodyn.workflows.scene.fields import Length, quantity
 from tribodyn.workflows.scene.scene_file import AnyPath
@@ -101,16 +104,14 @@ class WornScans(StudyResult):
 
     def write(self, folder: Path) -> list[Path]:
         """Write worn.csv, a picture of every face, the line of the coefficient, gap.csv and wear.toml for a scene."""
-        from tribodyn.workflows.studies.scans import scan_plots
-
         pictures = {}
         for test in self.tests:
             stem = "".join(c if c.isalnum() else "_" for c in test.name)
             for n, face in enumerate(test.faces, 1):
                 title = f"{test.name}, face {n}{'' if face.alignment.is_found else ': DOUBTFUL, no common texture'}"
-                pictures[f"worn_{stem}_{n}"] = scan_plots.worn_face(face, title)
+                pictures[f"worn_{stem}_{n}"] = _picture(face, title)
         if self.coefficient is not None:
-            pictures["coefficient"] = scan_plots.coefficient_line(self.coefficient)
+            pictures["coefficient"] = self.coefficient.plot()
         files = write_files(folder, {"worn": self.columns()}, pictures)
         keys = [f"# DOUBTFUL: {doubt}" for doubt in self._doubts()]
         keys += [] if self.coefficient is None else [*self.coefficient.keys(), ""]
@@ -230,3 +231,37 @@ def _cells(face: WornFace) -> tuple[str, ...]:
 def _volume(value: float) -> str:
     """In a unit that fits scans."""
     return f"{1e9 * value:.4g} mm³" if abs(value) >= 1e-11 else f"{1e18 * value:.4g} µm³"
+
+
+def _picture(face: WornFace, title: str) -> Figure:
+    """Both scans levelled, the depth with the border of what wore, and a profile through the deepest place."""
+    x, y = (1e3 * values for values in face.pair.grid)
+    depth = face.map
+    unit, scale = length_unit(face.deepest)
+    row = int(np.argmax(np.where(face.region, depth.z, -np.inf).max(axis=1)))
+    scans = [centred(level(scan)) for scan in (face.pair.pristine, face.pair.worn)]
+    low, high = 1e6 * np.nanpercentile(scans[1].z, (0.5, 99.5))
+    with axes_of(9.2, 7.4, rows=2, columns=2, share=False) as (figure, axes):
+        for pane, scan, name in zip(axes[0], scans, ("pristine", "worn, as scanned"), strict=True):
+            _map(pane, 1e3 * scan.x, 1e3 * scan.y, 1e6 * scan.z, "height / µm", (low, high))
+            pane.set_title(name)
+        _map(axes[1, 0], x[:, 0], y[0], scale * depth.z, f"depth / {unit}", (0.0, scale * max(face.deepest, 1e-12)))
+        if face.worn.any():
+            axes[1, 0].contour(x, y, face.worn, [0.5], colors=ORANGE, linewidths=0.8)
+        axes[1, 0].axvline(x[row, 0], color=GREY, lw=0.8, ls="--")
+        axes[1, 0].set_title("depth, border of what wore")
+        axes[1, 1].plot(y[row], -scale * face.depth[row], color=GREY, lw=0.6, label="points")
+        axes[1, 1].plot(y[row], -scale * depth.z[row], color=BLUE, label="mean of neighbours")
+        axes[1, 1].set(xlabel="y / mm", ylabel=f"- depth / {unit}", title=f"profile at x = {x[row, 0]:.3g} mm")
+        axes[1, 1].legend()
+        figure.suptitle(title, x=0.01, ha="left")
+    return figure
+
+
+def _map(axes: Any, x: np.ndarray, y: np.ndarray, values: np.ndarray, label: str, limits: tuple[float, float]) -> None:
+    step = max(max(values.shape) // 300, 1)  # more points than the picture shows would only make it large
+    x, y, values = x[::step], y[::step], values[::step, ::step].T
+    shown = axes.pcolormesh(x, y, values, cmap=WEAR_MAP, vmin=limits[0], vmax=limits[1], rasterized=True)
+    axes.set(aspect="equal", xlabel="x / mm", ylabel="y / mm")
+    axes.grid(visible=False)
+    axes.figure.colorbar(shown, ax=axes, label=label, shrink=0.85)
