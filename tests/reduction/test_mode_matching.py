@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from proof.mode_matching import match_kinds
+from proof.cases.rig.joints import match_kinds
 
 
 def test_a_mode_of_its_kind_is_taken_before_a_nearer_one_of_another_kind() -> None:

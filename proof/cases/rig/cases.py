@@ -15,13 +15,16 @@ from proof.cases.rig import fit as rig_fit
 from proof.cases.rig.joints import Joints, joints_of
 from proof.cases.rig.model import Cycle, Rig
 from proof.cases.rig.published import MATING_HEIGHTS, STUCK_COMPLEX, TABLE_5_3
-from proof.cases.rig.time import InTime, in_time
 from proof.cases.rig.wear import RigWear, loop, wear_down
 from proof.problems import contact_patch, follow_arc_length, linear_references, state_at
 from tribodyn.hbm.continuation.branch import Branch
+from tribodyn.hbm.time.stepper import IntegrationFailed, Options as TimeOptions
+from tribodyn.hbm.time.verify import verify
 from tribodyn.workflows.result.result import Patch, References
+from tribodyn.workflows.run.settings import OUTPUT
 from tribodyn.workflows.scene.scene_file import SceneFile
 
+STEPS, PERIODS, DRIFT = 1024, 200, 1e-5  # in time: per period; to settle in; of the state over one period
 STAGES = (0.0, 0.25, 0.5, 0.75, 1.0)  # of the volume worn when the preload is lost
 CLEARANCE = 1e-4  # mating height that leaves the faces apart [m]
 STUCK_PRELOAD = 150.0  # beyond which the experiment saw no relative displacement [N]
@@ -36,6 +39,20 @@ class Height:
     height: float
     preload: float
     reaction: float
+
+
+@dataclass(frozen=True)
+class InTime:
+    """Time integration beside the balance: energy per cycle [J], preload [N], and how the integration ended.
+
+    amplitude : of the balance's response over that in time, less one
+    The numbers are those of the last period, periodic or not; None where there is none."""
+
+    energy: float | None
+    preload: float | None
+    amplitude: float | None
+    outcome: str
+    periodic: bool = False
 
 
 @dataclass(frozen=True)
@@ -141,6 +158,18 @@ def _stage(rig: Rig, run: RigWear, share: float, tell: Callable[[str], None]) ->
     state = state_at(balance, 2 * np.pi * rig.frequency, run.history.displacement[row])
     cycle = opened.told(model, state)
     return Stage(row, cycle, in_time(opened, cycle), response, *loop(rig.model().balance, run.history, row))
+
+
+def in_time(rig: Rig, cycle: Cycle) -> InTime:
+    """Integrate from a solved cycle to the periodic motion nearby."""
+    options = TimeOptions(STEPS, tolerance=DRIFT, max_periods=PERIODS)
+    try:
+        result = verify(rig.model().balance, cycle.state, options)
+    except IntegrationFailed as failure:
+        return InTime(None, None, None, str(failure))
+    amplitude = result.amplitude[OUTPUT]
+    energy = float(result.motion.energy.sum())
+    return InTime(energy, result.motion.preload, amplitude, str(result.outcome), result.motion.periodic)
 
 
 def solved(branch: Branch) -> np.ndarray:

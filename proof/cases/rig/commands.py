@@ -32,12 +32,17 @@ def rig(
         fit: the wear coefficient too, from a whole wear run, minutes.
     out
         study: folder of table and pictures; results/rig_study by default."""
-    from proof.cases.rig import fit as rig_fit, study as rig_study, table as rig_table
+    from proof.cases.rig import cases, figures, fit as rig_fit, model, table as rig_table
+    from tribodyn.workflows.scene.scene_file import read_scene
 
     if work == "fit":
         print(rig_fit.as_text(rig_fit.run(scene, overrides, column, wear, report_progress)))
         return
     make_room(out)
-    table, paths = rig_study.run(scene, overrides, out or Path("results") / "rig_study", report_progress)
-    print(rig_table.as_text(table))
-    print(*paths, sep="\n")
+    file, folder = read_scene(scene, overrides), out or Path("results") / "rig_study"
+    model.check(file)
+    study = cases.compute(file, report_progress)
+    text, path = rig_table.as_text(rig_table.table(study)), folder / "comparison.md"
+    folder.mkdir(parents=True, exist_ok=True)
+    path.write_text(text, encoding="utf-8")
+    print(text, path, *figures.draw(study, folder), sep="\n")

@@ -1,16 +1,17 @@
 """Open and stuck frequencies of the fretting rig as functions of the stiffness of its joints.
 
 The rig is reduced once with the nodes of all joints kept, so that a change of joint springs costs a dense eigenvalue
-problem. Modes are told apart by how the beam moves: tangential and normal bending, twisting."""
+problem. Modes are told apart by how the beam moves, tangential and normal bending, twisting: frequencies alone mislead
+where modes cross."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.optimize import linear_sum_assignment
 
 from proof.cases.rig.published import OPEN, STUCK
 from proof.joint_springs import JointSprings, joint_springs
-from proof.mode_matching import match_kinds
 from tribodyn.workflows.scene.scene_file import SceneFile
 
 KINDS = ("tangential", "normal", "twisting")
@@ -59,3 +60,25 @@ def joints_of(file: SceneFile) -> Joints:
     places = (("low", "y"), ("middle", "y"), ("high", "y"), ("middle", "z"))
     probes = {f"{place}{k}_{axis}": (f"{place}{k}", axis) for place, axis in places for k in STATIONS}
     return Joints(joint_springs(file, probes))
+
+
+def match_kinds(
+    frequency: np.ndarray,
+    share: np.ndarray,
+    targets: Sequence[tuple[int, float]],
+    dominant: float = 0.4,
+    stranger: float = 10.0,
+) -> np.ndarray:
+    """The mode (n_wanted,) that stands for each wanted one: of its kind, and nearest in frequency on the whole.
+
+    frequency : (n,) of the modes; share : (n, n_kind) of each mode's motion that is of a kind
+    wanted : kind and frequency of each; dominant : share from which on a mode counts as one of a kind
+    stranger : cost of a mode of another kind, beside squared logarithms of ratios of frequencies
+    Returns indices into frequency, no two the same; where there are too few modes of a kind, one of another kind stands
+    Raises  ValueError where there are fewer modes than wanted ones"""
+    if len(targets) > len(frequency):
+        raise ValueError(f"{len(targets)} modes are wanted of {len(frequency)}: compute more modes")
+    distance = np.log(np.asarray(frequency)[None, :] / np.array([[value] for _, value in targets])) ** 2
+    for row, (kind, _) in zip(distance, targets, strict=True):
+        row[share[:, kind] < dominant] = stranger
+    return np.asarray(linear_sum_assignment(distance)[1])

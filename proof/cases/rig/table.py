@@ -45,7 +45,7 @@ class Trend:
 
 @dataclass(frozen=True)
 class Check:
-    """A stage of wear by harmonic balance and by time integration, as `rig_time.InTime`; energies [J], preloads [N]."""
+    """A stage of wear by harmonic balance and by time integration, as `cases.InTime`; energies [J], preloads [N]."""
 
     cycles: float
     preload_at_rest: float

@@ -1,6 +1,5 @@
 """The fretting rig: its prescribed height, its fits, and a coarse run of the study beside the published experiment."""
 
-import json
 from dataclasses import replace
 from pathlib import Path
 
@@ -9,11 +8,10 @@ import pytest
 from scipy.linalg import eigh
 
 from proof import __main__ as cli
-from proof.cases.rig import fit as rig_fit, published, table as rig_table, time as rig_time
-from proof.cases.rig.cases import apart
+from proof.cases.rig import cases as rig_cases, fit as rig_fit, published, table as rig_table
+from proof.cases.rig.cases import apart, in_time
 from proof.cases.rig.joints import Modes, joints_of
 from proof.cases.rig.model import Rig
-from proof.cases.rig.time import in_time
 from proof.cases.rig.wear import RigWear, wear_down
 from tests.helpers.coarse_scenes import QUICK_RIG as QUICK, RIG as COARSE
 from tests.helpers.fits import STEP, fit_by_differences as fit
@@ -170,9 +168,9 @@ def test_both_wear_rules_use_up_the_preload_alike():
 
 
 def test_the_study_compares_every_number_and_draws(tmp_path, capsys, monkeypatch):
-    monkeypatch.setattr(rig_time, "STEPS", 128)
-    monkeypatch.setattr(rig_time, "PERIODS", 40)
-    words = ["rig", "study", "--json", "--out", str(tmp_path)]
+    monkeypatch.setattr(rig_cases, "STEPS", 128)
+    monkeypatch.setattr(rig_cases, "PERIODS", 40)
+    words = ["rig", "study", "--out", str(tmp_path)]
     smaller = ("geometry.n_contact_width=3", "wear.step=25 %", "response.frequency=['287 Hz', '293 Hz']")
     for override in (*QUICK, *smaller):
         words += ["--set", override]
@@ -180,28 +178,24 @@ def test_the_study_compares_every_number_and_draws(tmp_path, capsys, monkeypatch
         cli.main(words)
     assert not stop.value.code
     out, err = capsys.readouterr()
-    record = json.loads(out)
-    numbers = {(n["topic"], n["name"]): n for n in record["numbers"]}
-    total = sum(number["topic"] == "frequency" for number in record["numbers"])
-    assert total == len(published.OPEN) + len(published.STUCK) + 1
-    assert sum(topic == "energy per cycle" for topic, _ in numbers) == len(published.TABLE_5_3)
-    lives = [name for topic, name in numbers if topic == "life"]
-    assert sum("harmonics 0 to 2" in name for name in lives) == 1
+    assert out.count("| frequency: ") == len(published.OPEN) + len(published.STUCK) + 1
+    assert out.count("| energy per cycle: ") == len(published.TABLE_5_3)
+    lives = [line for line in out.splitlines() if line.startswith("| life: ")]
+    assert sum("harmonics 0 to 2," in line for line in lives) == 1
     assert len(lives) == len(published.MATING_HEIGHTS) + 1
-    assert numbers["wear", "slope of volume over work"]["ours"] == pytest.approx(5500, rel=1e-6)
-    assert numbers["preload", "at the start"]["published"] == published.PRELOAD
-    agrees = {t["published"]: t["agrees"] for t in record["trends"]}
+    assert "| wear: slope of volume over work, um3/J | 5500 | 5500 |" in out
+    assert f"| preload: at the start, N | {published.PRELOAD:.4g} |" in out
     for trend in (
         "the reaction at the platform is the preload", "no interference, no preload", "linear in friction work",
         "without contact the response is the open one", "3 um less: shorter life", "falls all the time",
     ):  # fmt: skip
-        assert agrees[trend], trend
+        assert any(f"| {trend} |" in line and line.endswith("| yes |") for line in out.splitlines()), trend
     assert "mating height -3 um" in err
-    assert len(record["checks"]) == 5
-    assert len(record["files"]) == 9
-    assert all((tmp_path / name.rsplit("/", 1)[-1]).stat().st_size > 1000 for name in record["files"])
-    text = (tmp_path / "comparison.md").read_text(encoding="utf-8")
-    assert text.count("\n|") >= len(record["numbers"]) + len(record["trends"])
+    table, files = out.split("| 10^6 cycles |")[1].splitlines(), out.rsplit("one thread", 1)[1].split()
+    assert sum(line.startswith("| ") for line in table[1:]) == 5
+    assert len(files) == 9
+    assert all(Path(name).stat().st_size > 1000 for name in files)
+    assert (tmp_path / "comparison.md").read_text(encoding="utf-8") in out
 
 
 @pytest.mark.parametrize(("override", "words"), [
