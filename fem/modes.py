@@ -4,8 +4,8 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from scipy.linalg import LinAlgError, cholesky, eigh, eigvalsh, solve_triangular
-from scipy.sparse import block_array
+from scipy.linalg import LinAlgError, cholesky, eigh, solve_triangular
+from scipy.sparse import block_array, csr_matrix
 from scipy.sparse.linalg import ArpackNoConvergence, LinearOperator, eigsh
 from threadpoolctl import threadpool_limits
 
@@ -21,12 +21,12 @@ class EigenOptions:
     dense_below : DOFs up to which all modes of dense matrices are found; beyond, the Lanczos iteration
     restarts : of the Lanczos iteration; a sound mesh needs some ten
     negative : squared frequency below zero, over the largest of a single DOF, that is no rounding any more
-    spanned : modes without Coriolis forces that span those with them; a system with fewer coordinates keeps them all"""
+    turning : relative change of a frequency with Coriolis forces at which its motion is known"""
 
     dense_below: int = 400
     restarts: int = 100
     negative: float = 1e-10
-    spanned: int = 300
+    turning: float = 1e-9
 
 
 EIGEN = EigenOptions()
@@ -122,20 +122,43 @@ def turning_frequencies(K: Any, M: Any, G: Any, n: int) -> np.ndarray:
 
     K, M : (N, N) sparse or dense, Hermitian, as for `modes`; G : (N, N) anti-Hermitian [N s/m]
     Of a wave of index j these are the motions that run with the rotation where j > 0; those against it belong to -j.
-    The pencil is linearised as A y = omega B y, A = diag(K, M), B = [[-H, M], [M, 0]], H = iG, y = (q, omega q)
+    A large system is projected on modes without Coriolis forces and on corrections of the motions by their residual,
+    solved with K, until no frequency changes any more
     Raises  Refusal where n is too large, StaticDivergence as `modes` does
-    Source  Meirovitch, Computational Methods in Structural Dynamics, 1980, chapter 5"""
-    lowest, phi = modes(K, M, min(K.shape[0], max(EIGEN.spanned, 2 * n)))
+    Source  Meirovitch, Computational Methods in Structural Dynamics, 1980, chapter 5; Davidson, J. Comput. Phys. 17
+    (1975) 87"""
+    size = K.shape[0]
+    if isinstance(K, np.ndarray) or 4 * n >= size:
+        return _turning_modes(dense(K), dense(M), dense(G), n)[0]
+    K = csr_matrix(K, dtype=complex)
+    factor, sigma = _factorise_shifted(K, M, None)
+    basis = modes(K, M, 2 * n, sigma, factor)[1]
+    last, change = np.zeros(n), np.inf
+    while True:
+        projected = (basis.conj().T @ (matrix @ basis) for matrix in (K, M, G))
+        omega, motions = _turning_modes(*projected, n)
+        last_change, change = change, float(np.max(np.abs(omega - last) / omega))
+        if change <= EIGEN.turning or change >= last_change:  # as near as rounding lets it
+            return omega
+        last, q = omega, basis @ motions
+        correction = factor.solve(K @ q + (1j * (G @ q) - (M @ q) * omega) * omega)
+        basis = np.linalg.qr(np.hstack([basis, correction / np.linalg.norm(correction, axis=0)]))[0]
+
+
+def _turning_modes(K: np.ndarray, M: np.ndarray, G: np.ndarray, n: int) -> tuple[np.ndarray, np.ndarray]:
+    """The same of dense matrices with their motions q (N, n).
+
+    The pencil is linearised as A y = omega B y, A = diag(K, M), B = [[-H, M], [M, 0]], H = iG, y = (q, omega q)"""
+    lowest, phi = modes(K, M, K.shape[0])
     m = len(lowest)
     H = 1j * (phi.conj().T @ (G @ phi))
     H = (H + H.conj().T) / 2
     # rigid motions: a shift too small to be seen keeps A definite
     square = np.maximum(lowest, 1e-7 * lowest[-1]) ** 2
-    A = np.concatenate([square, np.ones(m)])
-    B = np.block([[-H, np.eye(m)], [np.eye(m), np.zeros((m, m))]]) / np.sqrt(np.outer(A, A))
-    slowness = eigvalsh(B)
-    omega = np.sort(1.0 / slowness[slowness > 0])
-    return np.asarray(omega[:n])
+    root = np.sqrt(np.concatenate([square, np.ones(m)]))
+    slowness, y = eigh(np.block([[-H, np.eye(m)], [np.eye(m), np.zeros((m, m))]]) / np.outer(root, root))
+    fastest = np.flatnonzero(slowness > 0)[::-1][:n]
+    return 1.0 / slowness[fastest], phi @ (y[:m, fastest] / root[:m, None])
 
 
 def frequencies(values: np.ndarray, K: Any, M: Any) -> np.ndarray:
@@ -176,7 +199,7 @@ class _OfHermitian:
     name: str = "of a Hermitian matrix"
 
     def solve(self, rhs: np.ndarray) -> np.ndarray:
-        real, imaginary = np.split(self.factor.solve(np.concatenate([rhs.real, rhs.imag]).ravel()), 2)
+        real, imaginary = np.split(self.factor.solve(np.concatenate([rhs.real, rhs.imag])), 2)
         return np.asarray(real + 1j * imaginary)
 
 

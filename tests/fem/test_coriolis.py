@@ -68,5 +68,5 @@ def test_frequencies_are_those_of_the_first_order_system() -> None:
     values = np.linalg.eigvals(companion)
     assert np.abs(values.real).max() < 1e-5 * np.abs(values).max()
     result = np.sort(values.imag[values.imag > 0])[:4]
-    assert turning_frequencies(K, M, G, 4) == pytest.approx(result, rel=1e-6)
+    assert turning_frequencies(system.stiffness, system.mass, system.gyroscopic, 4) == pytest.approx(result, rel=1e-6)
     assert np.abs(G + G.conj().T).max() == 0.0

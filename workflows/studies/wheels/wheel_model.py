@@ -195,7 +195,7 @@ def critical_speeds(wave: Wave, order: int, slow: float, fast: float, count: int
         return float(wave(speed)[family]) - abs(order) * speed
 
     return sorted(
-        (family, float(brentq(miss, low, high, (family,))))
+        (family, float(brentq(miss, low, high, (family,), rtol=1e-9)))
         for low, high in pairwise(np.linspace(slow, fast, count).tolist())
         for family in np.flatnonzero((wave(low) > abs(order) * low) & (wave(high) <= abs(order) * high)).tolist()
     )
