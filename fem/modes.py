@@ -135,8 +135,8 @@ def turning_frequencies(K: Any, M: Any, G: Any, n: int) -> np.ndarray:
     basis = modes(K, M, 2 * n, sigma, factor)[1]
     last, change = np.zeros(n), np.inf
     while True:
-        projected = (basis.conj().T @ (matrix @ basis) for matrix in (K, M, G))
-        omega, motions = _turning_modes(*projected, n)
+        stiffness, mass, coriolis = (basis.conj().T @ (matrix @ basis) for matrix in (K, M, G))
+        omega, motions = _turning_modes(stiffness, mass, coriolis, n)
         last_change, change = change, float(np.max(np.abs(omega - last) / omega))
         if change <= EIGEN.turning or change >= last_change:  # as near as rounding lets it
             return omega

@@ -82,8 +82,9 @@ class WheelModes(StudyResult):
                 texts.append(f"{where}: {', '.join(each)}")
         for state, crossing in self.critical.items():
             for order in self.orders:
-                at = ", ".join(f"{60 * m.speed:.0f}" for m in crossing if m.engine_order == order) or "no"
-                texts.append(f"engine order {order}: critical at {at} rpm, {state}")
+                rpm = ", ".join(f"{60 * m.speed:.0f}" for m in crossing if m.engine_order == order)
+                at = f"critical at {rpm} rpm" if rpm else "no critical speed"
+                texts.append(f"engine order {order}, contact {state}: {at}")
         if self.line_error > TYPICAL.line_error:
             texts.append(
                 f"warning: its stress changes abruptly along the speed: frequencies hold to {self.line_error:.1e}"
