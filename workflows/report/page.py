@@ -145,7 +145,7 @@ def _method(result: Result) -> str:
         f"Its contact has {facts.contact_pairs} pairs of the law {laws}. The motion is a sum of the harmonics "
         f"{', '.join(map(str, result.harmonics))}, balanced with the contact forces over one cycle.",
         f"Wear follows the law {wear}, in steps of many cycles." if wear and result.wear_steps else "",
-        "Friction, stiffness and wear coefficient are inputs: their scatter is in none of the errors.",
+        "Friction, stiffness and wear coefficient are inputs: no error includes their scatter.",
     ]  # fmt: skip
     return f"<p>{escape(' '.join(filter(None, sentences)))}</p>"
 
