@@ -18,6 +18,7 @@ from scipy.sparse import csr_matrix
 from tribodyn.fem.assembly import Materials, Piece, materials_of, pieces
 from tribodyn.fem.elasticity import element_materials, element_tensors, formulation, strain_operators, strain_points
 from tribodyn.fem.elements import connectivity, coordinates
+from tribodyn.fem.material import AnyMaterial
 from tribodyn.geometry.element_library import skfem
 from tribodyn.refusal import Refusal
 
@@ -38,6 +39,14 @@ class NodalStress:
     tensor: np.ndarray
 
 
+def solids(mesh: Any, material: Any) -> Iterator[tuple[Piece, Materials, AnyMaterial, np.ndarray]]:
+    """Yield every material of every body: its piece, what that is made of, itself, and the elements (n,) of it."""
+    for piece, material_of_piece in materials_of(mesh, material):
+        kinds, kind_of = element_materials(piece.mesh, material_of_piece)
+        for number, kind in enumerate(kinds):
+            yield piece, material_of_piece, kind, np.flatnonzero(kind_of == number)
+
+
 def nodal_stress(mesh: Any, material: Any, u: np.ndarray, temperature: np.ndarray | None = None) -> NodalStress:
     """Stress at all nodes of a mesh or an assembly.
 
@@ -46,15 +55,11 @@ def nodal_stress(mesh: Any, material: Any, u: np.ndarray, temperature: np.ndarra
         entry of the last axis of u where that has one, such as the static coefficient"""
     shape = u.shape[2:]
     flat = u.reshape(*u.shape[:2], -1)
-    results, first = [], 0
-    for piece, material_of_piece in materials_of(mesh, material):
-        kinds, kind_of = element_materials(piece.mesh, material_of_piece)
-        for number in range(len(kinds)):
-            elements = np.flatnonzero(kind_of == number)
-            if len(elements):
-                node, tensor = _averaged(piece, material_of_piece, elements, flat, temperature)
-                results.append((node, np.full(len(node), first + number), tensor))
-        first += len(kinds)
+    results = []
+    for number, (piece, material_of_piece, _, elements) in enumerate(solids(mesh, material)):
+        if len(elements):
+            node, tensor = _averaged(piece, material_of_piece, elements, flat, temperature)
+            results.append((node, np.full(len(node), number), tensor))
     node, number_of, tensor = (np.concatenate(parts) for parts in zip(*results, strict=True))
     return NodalStress(node, number_of, tensor.reshape(len(node), 6, *shape))
 
@@ -146,14 +151,9 @@ def locate(
     target, names = np.asarray(point, float), [each.name for each in getattr(mesh, "bodies", ())]
     if body is not None and body not in names:
         raise Refusal(f"{label}: there is no body '{body}'", cure=f"give one of {', '.join(names)}")
-    best: tuple[float, float, PartPoint] | None = None
-    for position, piece in enumerate(pieces(mesh)):
-        if body is None or names[position] == body:
-            distance, size, place = _nearest(piece, target, near)
-            if best is None or distance < best[0]:
-                best = distance, size, place
-    assert best is not None
-    distance, size, place = best
+    searched = pieces(mesh) if body is None else [pieces(mesh)[names.index(body)]]
+    candidates = [_nearest(piece, target, near) for piece in searched]
+    distance, size, place = min(candidates, key=lambda candidate: candidate[0])
     if distance > outside * size:
         x, y, z = 1e3 * place.point
         raise Refusal(

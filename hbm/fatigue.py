@@ -14,7 +14,6 @@ from typing import TYPE_CHECKING, Any, Protocol
 import numpy as np
 
 from tribodyn.hbm.harmonics import HarmonicBasis
-from tribodyn.refusal import Refusal
 
 if TYPE_CHECKING:
     from tribodyn.hbm.balance import HarmonicBalance, State
@@ -54,15 +53,8 @@ class Strength:
         if not isinstance(self.diagram, str):
             table = np.asarray(self.diagram, float)
             return np.interp(mean, table[:, 0], table[:, 1], right=0.0)
-        tension = np.maximum(mean, 0.0)
-        if self.diagram == "soderberg":
-            if self.yield_strength is None:
-                raise Refusal("the diagram of Soderberg ends at the yield strength", cure="give yield_strength")
-            share = 1 - tension / self.yield_strength
-        elif self.diagram == "gerber":
-            share = 1 - (tension / self.strength) ** 2
-        else:
-            share = 1 - tension / self.strength
+        end = self.yield_strength if self.diagram == "soderberg" else self.strength
+        share = 1 - (np.maximum(mean, 0.0) / (end or np.nan)) ** (2 if self.diagram == "gerber" else 1)
         return self.endurance_limit * np.maximum(share, 0.0)
 
     def damage(self, utilisation: np.ndarray) -> np.ndarray:
@@ -153,41 +145,35 @@ class StressOverCycle:
 
     largest : (n_node,) of von Mises [Pa]; utilisation : (n_node,) nan where the strength is not known
     mean, amplitude : (n_node,) equivalent ones at the largest utilisation [Pa], nan likewise
-    tensor : (n_node, 2, 6) mean over the cycle, and at the instant of the largest stress of von Mises [Pa]"""
+    tensor : (n_node, 2, 6) mean over the cycle, and at the instant of the largest stress of von Mises [Pa]
+    tension, watson : (n_pair,) `face_indicators`, the larger of both faces; face_node : (n_pair,) that it is of"""
 
     largest: np.ndarray
     utilisation: np.ndarray
     mean: np.ndarray
     amplitude: np.ndarray
     tensor: np.ndarray
+    tension: np.ndarray
+    watson: np.ndarray
+    face_node: np.ndarray
 
 
 class StressField(Protocol):
     """Computes the stress of a whole part; kinds : (n_node,) what stands at each node, of fem.singularities.KINDS.
 
     omitted : what the modes left out carry, None where that is not known; is_searched : whether the largest of the
-    part is asked for"""
+    part is asked for; over_cycle : that of a vibration, u (n_node, 3, n_coeff) [m]; of_state : that of a solved state
+    singularity : point of a node or a named place, and what makes the exact stress infinite there; "" for nothing"""
 
     @property
     def is_searched(self) -> bool: ...
-
     @property
     def kinds(self) -> np.ndarray: ...
-
     @property
     def omitted(self) -> OmittedModes | None: ...
-
-    def over_cycle(self, u: np.ndarray, basis: HarmonicBasis) -> StressOverCycle:
-        """That of a vibration; u : (n_node, 3, n_coeff) displacement of the nodes [m]."""
-        ...
-
-    def of_state(self, balance: HarmonicBalance, state: State) -> StressOverCycle:
-        """That of a solved state."""
-        ...
-
-    def singularity(self, where: int | str) -> str:
-        """Point of a node or a named place, and what makes the exact stress infinite there; "" where nothing does."""
-        ...
+    def over_cycle(self, u: np.ndarray, basis: HarmonicBasis) -> StressOverCycle: ...
+    def of_state(self, balance: HarmonicBalance, state: State) -> StressOverCycle: ...
+    def singularity(self, where: int | str) -> str: ...
 
 
 def over_cycle(coefficients: np.ndarray, basis: HarmonicBasis, samples: int = 256) -> np.ndarray:
@@ -236,16 +222,23 @@ def haigh_point(coefficients: np.ndarray, basis: HarmonicBasis, samples: int = 2
     return equivalent_mean(coefficients, basis, samples), equivalent_amplitude(coefficients, basis, samples)
 
 
-def crossland(
-    coefficients: np.ndarray, basis: HarmonicBasis, tension: float, torsion: float, amplitude: np.ndarray, samples: int
+def face_indicators(
+    coefficients: np.ndarray, frame: np.ndarray, compliance: np.ndarray, basis: HarmonicBasis, planes: int = 72
 ) -> np.ndarray:
-    """Utilisation (...) by the amplitude of the root of J2 and the largest hydrostatic stress of a cycle.
+    """Largest tension in a cycle along a face, and the number of Smith, Watson and Topper: (2, n) [Pa].
 
-    tension, torsion : amplitudes that are endured when reversed, which give the two constants [Pa]
-    amplitude : (...) equivalent one [Pa]"""
-    pressure = over_cycle(coefficients, basis, samples)[..., :3].sum(axis=-1).max(axis=-1) / 3
-    slope = (torsion - tension / np.sqrt(3)) / (tension / 3)
-    return np.asarray((amplitude / np.sqrt(3) + slope * pressure) / torsion)
+    Of all planes that stand on the face the latter is the largest product of the largest tension across one and half
+    the range of strain across it
+    coefficients : (n, 6, n_coeff) stress [Pa]; frame : (n, 3, 3) rows t1, t2 along the face and its normal
+    compliance : (n, 6, 6) strains xx, yy, zz, 2yz, 2xz, 2xy of stresses [1/Pa]
+    Source  Smith, Watson and Topper, J. Materials 5 (1970) 767; planes: Szolwinski and Farris, Wear 198 (1996) 93"""
+    angle = np.pi * np.arange(planes) / planes
+    directions = np.stack([np.cos(angle), np.sin(angle)], axis=1) @ frame[:, :2]
+    products = directions[..., [0, 1, 2, 1, 0, 0]] * directions[..., [0, 1, 2, 2, 2, 1]]
+    stress = np.swapaxes(over_cycle(coefficients, basis, samples=64), -1, -2)
+    strain = products @ compliance @ stress
+    tension = np.maximum(products * [1, 1, 1, 2, 2, 2] @ stress, 0.0).max(axis=-1)
+    return np.stack([tension.max(axis=-1), (tension * np.ptp(strain, axis=-1) / 2).max(axis=-1)])
 
 
 def utilisation(
@@ -259,7 +252,10 @@ def utilisation(
 
     point : equivalent mean and amplitude (...) [Pa] where these are known"""
     mean, amplitude = haigh_point(coefficients, basis, samples) if point is None else point
-    if strength.torsion_limit is not None:
-        return crossland(coefficients, basis, strength.endurance_limit, strength.torsion_limit, amplitude, samples)
+    torsion = strength.torsion_limit
+    if torsion is not None:  # Crossland: amplitude of the root of J2, and the largest hydrostatic stress
+        pressure = over_cycle(coefficients, basis, samples)[..., :3].sum(axis=-1).max(axis=-1) / 3
+        slope = 3 * torsion / strength.endurance_limit - np.sqrt(3)
+        return np.asarray((amplitude / np.sqrt(3) + slope * pressure) / torsion)
     with np.errstate(divide="ignore", invalid="ignore"):
         return np.where(amplitude > 0, amplitude / strength.permissible(mean), 0.0)

@@ -7,7 +7,7 @@ quantity: summary, JSON, text, report, errors, columns of studies and derivative
 from __future__ import annotations
 
 import importlib
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from enum import StrEnum
 from functools import cache
@@ -103,6 +103,16 @@ class CurveQuantity(StatedQuantity):
     """A number of a whole response curve; value : SolvedCurve -> number, None where there is none."""
 
     value: Callable[[SolvedCurve], float | None]
+
+
+def largest_of(numbers: Callable[[Any], Mapping[Any, float]]) -> dict[str, Any]:
+    """What a quantity declares that is the largest of some numbers, each of a node or of a named place of the part."""
+
+    def where(source: Any) -> int | str:
+        values = numbers(source)
+        return max(values, key=values.__getitem__, default="")
+
+    return {"value": lambda source: max(numbers(source).values(), default=None), "where": where}
 
 
 Kinds = TypeVar("Kinds", bound=StatedQuantity)

@@ -31,7 +31,8 @@ class SolvedCycle:
     displacement, force : (n_pair, n_component, n_coeff) [m], [N]; components : of the contact, such as t1, t2, n
     joints : name -> its pairs; pairs : that the cycle is asked of, those of one joint or all
     driven : lowest harmonic that is driven; wear_coefficient : (n_pair,) [m3/J]
-    places : of the part whose stress is asked for, all or one; whole : computes the stress of all nodes"""
+    places : of the part whose stress is asked for, all or one; whole : computes the stress of all nodes
+    area : (n_pair,) of the pairs, where stress is asked for [m2]"""
 
     omega: float
     basis: HarmonicBasis
@@ -51,6 +52,7 @@ class SolvedCycle:
     wear_coefficient: np.ndarray | None = None
     places: tuple[StressPlace, ...] = ()
     whole: Callable[[], StressOverCycle] | None = None
+    area: np.ndarray | None = None
 
     @classmethod
     def of(
@@ -71,6 +73,7 @@ class SolvedCycle:
             {joint.name: joint.rows for joint in contact.joints}, driven=min(loaded), wear_coefficient=rate,
             places=balance.places,
             whole=cache(lambda: stress.of_state(balance, state)) if stress is not None and stress.is_searched else None,
+            area=balance.model.interface.area,
         )  # fmt: skip
 
     @classmethod
@@ -105,6 +108,16 @@ class SolvedCycle:
     def of_place(self, name: str) -> SolvedCycle:
         """The same cycle, asked of one place alone."""
         return replace(self, places=tuple(place for place in self.places if place.name == name))
+
+    def largest_of_pairs(self, numbers: Callable[[StressOverCycle], np.ndarray]) -> dict[int, float]:
+        """The node at the pair with the largest of some numbers (n_pair,) -> it; none where stress is not asked for."""
+        stress = None if self.whole is None else self.whole()
+        pairs = np.arange(0 if stress is None else len(stress.tension))[self.pairs]
+        if stress is None or not len(pairs):
+            return {}
+        of_pairs = numbers(stress)
+        best = pairs[of_pairs[pairs].argmax()]
+        return {int(stress.face_node[best]): float(of_pairs[best])}
 
     @cached_property
     def mask(self) -> np.ndarray:

@@ -1,22 +1,11 @@
 """Miner's sum over the cycles of the run and the duties of its mission, at the worst place: 1 is a crack."""
 
-from tribodyn.hbm.quantity import ErrorKind, WearQuantity, WornContact
+from tribodyn.hbm.quantity import ErrorKind, WearQuantity, WornContact, largest_of
 
 
 def sums(worn: WornContact) -> dict[str, float]:
     """Place -> its sum, of those with an S-N line."""
     return {name: float(p.miner_sum()[1][-1]) for name, p in worn.fatigue.items() if p.strength.knee}
-
-
-def value(worn: WornContact) -> float | None:
-    """The largest sum; None where no place has an S-N line."""
-    return max(sums(worn).values(), default=None)
-
-
-def where(worn: WornContact) -> str:
-    """Its place, "" for none."""
-    of_place = sums(worn)
-    return max(of_place, key=of_place.__getitem__, default="")
 
 
 def applies(worn: WornContact) -> bool:
@@ -25,6 +14,6 @@ def applies(worn: WornContact) -> bool:
 
 
 QUANTITY = WearQuantity(
-    "Miner's sum of fatigue", "", value, error=ErrorKind.DURATION, rank=29, grows=True, headline=False, applies=applies,
-    where=where,
+    "Miner's sum of fatigue", "", error=ErrorKind.DURATION, rank=29, grows=True, headline=False, applies=applies,
+    **largest_of(sums),
 )  # fmt: skip

@@ -1,18 +1,14 @@
 """Largest stress of von Mises over the cycle, anywhere in the part."""
 
-from tribodyn.hbm.quantity import CycleQuantity, ErrorKind, SolvedCycle
+from tribodyn.hbm.quantity import CycleQuantity, ErrorKind, SolvedCycle, largest_of
 
 
-def value(cycle: SolvedCycle) -> float | None:
-    """The largest of all nodes [Pa]; None where stress is not asked for."""
-    return None if cycle.whole is None else float(cycle.whole().largest.max())
-
-
-def where(cycle: SolvedCycle) -> int:
-    """Its node."""
-    return 0 if cycle.whole is None else int(cycle.whole().largest.argmax())
+def numbers(cycle: SolvedCycle) -> dict[int, float]:
+    """The node of the largest -> it [Pa]; none where stress is not asked for."""
+    stress = None if cycle.whole is None else cycle.whole().largest
+    return {} if stress is None else {int(stress.argmax()): float(stress.max())}
 
 
 QUANTITY = CycleQuantity(
-    "largest stress of the part (von Mises)", "Pa", value, error=ErrorKind.CYCLE, rank=10, where=where
+    "largest stress of the part (von Mises)", "Pa", error=ErrorKind.CYCLE, rank=10, **largest_of(numbers)
 )

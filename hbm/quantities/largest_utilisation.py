@@ -2,20 +2,15 @@
 
 import numpy as np
 
-from tribodyn.hbm.quantity import CycleQuantity, ErrorKind, SolvedCycle
+from tribodyn.hbm.quantity import CycleQuantity, ErrorKind, SolvedCycle, largest_of
 
 
-def value(cycle: SolvedCycle) -> float | None:
-    """The largest of all nodes; None where stress is not asked for or no strength is known."""
+def numbers(cycle: SolvedCycle) -> dict[int, float]:
+    """The node of the largest -> it; none where stress is not asked for or no strength is known."""
     use = np.zeros(0) if cycle.whole is None else cycle.whole().utilisation
-    return float(np.nanmax(use)) if np.isfinite(use).any() else None
-
-
-def where(cycle: SolvedCycle) -> int:
-    """Its node."""
-    return 0 if cycle.whole is None else int(np.nanargmax(cycle.whole().utilisation))
+    return {int(np.nanargmax(use)): float(np.nanmax(use))} if np.isfinite(use).any() else {}
 
 
 QUANTITY = CycleQuantity(
-    "largest utilisation of the part in fatigue", "", value, error=ErrorKind.CYCLE, rank=11, where=where
+    "largest utilisation of the part in fatigue", "", error=ErrorKind.CYCLE, rank=11, **largest_of(numbers)
 )

@@ -12,8 +12,9 @@ from tribodyn.fem.factor import factorise
 from tribodyn.fem.load_vectors import Centrifugal, Heating, NodalForce, Pressure
 from tribodyn.fem.material import Material
 from tribodyn.fem.part import build
-from tribodyn.fem.stress import locate, nodal_stress, strain_row, stress_rows
-from tribodyn.hbm.fatigue import von_mises
+from tribodyn.fem.stress import COLUMNS, ROWS, locate, nodal_stress, strain_row, stress_rows
+from tribodyn.hbm.fatigue import face_indicators, von_mises
+from tribodyn.hbm.harmonics import HarmonicBasis
 from tribodyn.refusal import Refusal
 
 
@@ -239,8 +240,14 @@ def test_contact_of_two_cylinders(stick, half_plane):
     points, stress = half_plane
     sliding, core = ellipse(1.0, 5e7), ellipse(stick or 1.0, 5e7 * stick)
     tensor = stress(ellipse(1.0, 1e8), lambda x: sliding(x) - core(x))
-    edge = np.flatnonzero((np.abs(points[:, 0] + 1) < 1e-9) & (points[:, 2] > -1e-9))
-    assert tensor[edge, 0].max() == pytest.approx(2 * 5e7 * np.sqrt(1 - stick**2), rel=0.03)
+    sheared = stress(lambda x: 0 * x, lambda x: sliding(x) - core(x))
+    edges = np.flatnonzero((np.abs(np.abs(points[:, 0]) - 1) < 1e-9) & (points[:, 2] > -1e-9))
+    cycle = np.stack([tensor - sheared, sheared, 0 * sheared], axis=-1)[edges]  # pressed, and sheared to and fro
+    S = np.linalg.inv(STEEL.tensor(points[edges])[:, ROWS, COLUMNS][:, :, ROWS, COLUMNS])
+    tension, watson = face_indicators(cycle, np.tile(np.eye(3), (len(edges), 1, 1)), S, HarmonicBasis((0, 1), 64))
+    exact = 2 * 5e7 * np.sqrt(1 - stick**2)
+    assert tension.max() == pytest.approx(exact, rel=0.03)
+    assert watson.max() == pytest.approx(exact**2 * (1 - STEEL.nu**2) / STEEL.E, rel=0.06)
     axis = np.flatnonzero((np.abs(points[:, 0]) < 1e-9) & (points[:, 1] == 0))
     shear = np.abs(tensor[axis, 0] - tensor[axis, 2]) / 2  # of an odd shear zero on the axis
     assert shear.max() == pytest.approx(0.300 * 1e8, rel=0.01)

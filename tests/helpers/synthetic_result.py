@@ -92,6 +92,7 @@ def result(n_row: int = 9, nx: int = 8) -> Result:
     bend[:, :, 1, 1] = 3e-3 * np.linspace(0.4, 1, 3)[:, None] * shape
     loop_x = (displacement.reshape(n_row, n_pair, 3, 3) @ functions.T)[rows]
     spot, stress = np.zeros((len(rows), 1), int), [v * np.ones(bend.shape[:2]) for v in (1e6, 0.5, 0.0, 1e6)]
+    of_pairs = [np.full((len(rows), n_pair), value) for value in (1e6, 10.0, 0)]
     stress.append(stress[0][..., None, None] * np.ones((2, 1)) * np.eye(6)[0])  # pulled along x
     loops = Loops(rows, loop_x, np.clip(1e8 * loop_x, -4e2, 4e2))
     return Result(
@@ -113,6 +114,6 @@ def result(n_row: int = 9, nx: int = 8) -> Result:
             rows, np.tile(omega, (3, 1)), np.abs([resonance(hertz, 0.015) for hertz in (510, 460, 420)])
         ),
         fields=Fields(rows, bend),
-        stress_field=Stress(rows, *stress, spot, np.zeros((len(rows), 1, 3)), spot),
+        stress_field=Stress(rows, *stress, *of_pairs, spot, np.zeros((len(rows), 1, 3)), spot),
         loops=loops,
     )

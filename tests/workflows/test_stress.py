@@ -9,7 +9,7 @@ import tribodyn as td
 from tests.helpers.small_decks import ENDING, Shape, bricks
 from tribodyn.fem.stress import nodal_stress
 from tribodyn.hbm import newton
-from tribodyn.hbm.fatigue import largest_von_mises, utilisation, von_mises
+from tribodyn.hbm.fatigue import largest_von_mises, over_cycle, utilisation, von_mises
 from tribodyn.hbm.harmonics import HarmonicBasis
 from tribodyn.hbm.linear.recovery import full_displacement
 from tribodyn.hbm.time.stepper import Options
@@ -106,6 +106,9 @@ def test_places_have_the_stress_of_the_field(run: td.Result, path: Path) -> None
     largest = largest_von_mises(field.tensor, balance.basis)
     assert summary["largest_stress"]["first"] == pytest.approx(largest.max(), rel=2e-3)
     assert summary["stress"]["first"] == pytest.approx(largest[node], rel=1e-9)
+    xx, yy, xy = over_cycle(field.tensor[part.points[:, 2] == 0], balance.basis)[..., [0, 1, 5]].T
+    principal = (xx + yy) / 2 + np.hypot((xx - yy) / 2, xy)
+    assert summary["contact_tension"]["first"] == pytest.approx(principal.max(), rel=2e-3)
     strain = run.response.response[best, run.response.output_names.index("gauge side")]
     slope = field.tensor[node] / 210e9
     expected = slope[0] - 0.3 * (slope[1] + slope[2])
@@ -194,6 +197,9 @@ def test_worn_by_two_duties(path: Path) -> None:
     np.testing.assert_array_equal(wear.duty_response[:, 0], wear.response)
     assert plots.figures(run)["fatigue"](run).axes
     rates = [utilisation(place.stress(r, basis), basis, place.strength) ** 4 @ [0.4, 0.6] for r in wear.duty_response]
+    tension, work = run.stress_field.tension[0], wear.energy[0] / (2 * run.patch.area)
+    assert summary["ruiz"]["first"] == pytest.approx((tension * work).max())
+    assert 0 < summary["smith_watson_topper"]["first"] < tension.max() ** 2 / 210e9 * 1.01
     assert summary["fatigue_damage"] == pytest.approx(np.trapezoid(rates, wear.cycles) / 1e6, rel=2e-2)
     assert summary["service_life"] == pytest.approx(1e6 / rates[0], rel=2e-2)
     model = modelling.build(scene_file.read(path, overrides), Progress(), run.harmonics)

@@ -4,7 +4,7 @@ from typing import Any
 
 import numpy as np
 
-from tribodyn.hbm.fatigue import Strength, equivalent_amplitude, equivalent_mean
+from tribodyn.hbm.fatigue import Strength, haigh_point
 from tribodyn.workflows.pictures.figures import axes_of, heading, present, titled
 from tribodyn.workflows.pictures.matplotlib_names import Figure
 from tribodyn.workflows.pictures.theme import CYCLE, INK, RED
@@ -75,9 +75,7 @@ def _courses(result: Result) -> dict[str, np.ndarray]:
             responses = np.stack([cycle.response for cycle in cycles[:1]]) if worn is None else worn.history.response
             basis = cycles[0].basis
             tensor = place.stress(responses, basis) / place.weakening
-            courses[f"place {place.name}"] = np.column_stack(
-                [equivalent_mean(tensor, basis), equivalent_amplitude(tensor, basis)]
-            )
+            courses[f"place {place.name}"] = np.column_stack(haigh_point(tensor, basis))
     return courses
 
 

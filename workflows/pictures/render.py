@@ -54,9 +54,7 @@ def figures(
     if result.part is not None and result.fields is not None:
         pictures["part"] = partial(part_picture, result, deformation, wear)
     if result.part is not None and result.fields is not None and result.stress_field is not None:
-        from tribodyn.workflows.pictures import stress_pictures  # only results that hold stress need it
-
-        pictures["stress"] = lambda: stress_pictures.stress_picture(MovingPart(result, deformation, wear))
+        pictures["stress"] = partial(stress_picture, result, deformation, wear)
     for contact in book.contacts(result):
         name = f"contact_{contact.name}" if contact.name else "contact"
         pictures[name] = partial(contact_picture, result, contact, wear)
@@ -72,28 +70,57 @@ def part_picture(result: Result, deformation: float | None = None, wear: float |
     """The part in each shown state at its largest swing, coloured by amplitude, one camera for all."""
     states = [state for state in shown_states(result) if state.field is not None]
     moving = MovingPart(result, deformation, wear)
-    images, scales, bars = [], [], []
+    images, titles, bars = [], [], []
     for state in states:
         amplitude, vibration = moving.amplitude(state), moving.swing(state)
-        scales.append(moving.vibration_scale(vibration))
-        unit, factor = length_unit(float(amplitude.max()))
-        bars.append((factor * float(amplitude.max()), f"vibration amplitude / {unit}"))
-        points = moving.points(state, scales[-1] * vibration)
-        view = moving.view(points, factor * amplitude, (0.0, bars[-1][0]))
+        scale, highest = moving.vibration_scale(vibration), float(amplitude.max())
+        unit, factor = length_unit(highest)
+        bars.append((MOTION_MAP, 0.0, factor * highest, f"vibration amplitude / {unit}"))
+        points = moving.points(state, scale * vibration)
+        view = moving.view(points, factor * amplitude, (0.0, bars[-1][2]))
         images.append(moving.marked(shoot(view, moving.camera, LAYOUT.view), points))
+        far = highest > LARGEST_BEND * size_of(result)
+        warned = "\nbeyond the linear model" if far else ""
+        titles.append((f"{state.label}\n{moving.factors(scale)}{warned}", RED if far else INK))
+    return _columns(moving, images, titles, bars, "part at its largest swing, its contact outlined")
+
+
+def stress_picture(result: Result, deformation: float | None = None, wear: float | None = None) -> Figure:
+    """The part at its largest swing in each shown state, by utilisation where it is known, else by stress."""
+    moving, stress = MovingPart(result, deformation, wear), present(result.stress_field)
+    is_judged = bool(np.isfinite(stress.utilisation).any())
+    name = "utilisation of the endurance limit" if is_judged else "largest stress over the cycle (von Mises) / MPa"
+    values = np.nan_to_num(stress.utilisation) if is_judged else 1e-6 * stress.largest
+    images, titles, bars = [], [], []
+    for state in (state for state in shown_states(result) if state.field is not None):
+        vibration, shown = moving.swing(state), values[present(state.field)]
+        points = moving.points(state, moving.vibration_scale(vibration) * vibration)
+        bars.append((PRESSURE_MAP, 0.0, float(shown.max()), name))
+        titles.append((f"{state.label}\nlargest {shown.max():.3g}", INK))
+        image = shoot(moving.view(points, shown, bars[-1][1:3], PRESSURE_MAP), moving.camera, LAYOUT.view)
+        images.append(moving.numbered(image, points[stress.spot[present(state.field)]]))
+    return _columns(moving, images, titles, bars, "stress of the part at its largest swing, hot spots numbered")
+
+
+def _columns(
+    moving: "MovingPart",
+    images: list[np.ndarray],
+    titles: list[tuple[str, str]],
+    bars: list[tuple[Any, ...]],
+    head: str,
+) -> Figure:
+    """Images of the moving part side by side, with their titles and colours, and their scale bars."""
     images, corner = with_room(trimmed(images))
     with mpl.rc_context({**STYLE, "axes.grid": False}):
-        wide = max(LAYOUT.column, LAYOUT.least / len(states))
+        wide = max(LAYOUT.column, LAYOUT.least / len(images))
         tall = wide * images[0].shape[0] / images[0].shape[1]
-        figure = Figure(figsize=(wide * len(states) + 0.2, tall + 2.0), layout="constrained")
-        columns = np.atleast_1d(figure.subplots(1, len(states)))
-        for axes, state, image, scale, (highest, label) in zip(columns, states, images, scales, bars, strict=True):
+        figure = Figure(figsize=(wide * len(images) + 0.2, tall + 2.0), layout="constrained")
+        columns = np.atleast_1d(figure.subplots(1, len(images)))
+        for axes, image, (title, color), bar in zip(columns, images, titles, bars, strict=True):
             show(axes, image, moving.camera, "xyz", corner)
-            far = float(moving.amplitude(state).max()) > LARGEST_BEND * size_of(result)
-            warned = "\nbeyond the linear model" if far else ""
-            axes.set_title(f"{state.label}\n{moving.factors(scale)}{warned}", color=RED if far else INK)
-            scale_bar(figure, axes, MOTION_MAP, 0.0, highest, label)
-        heading(figure, result, "part at its largest swing, its contact outlined")
+            axes.set_title(title, color=color)
+            scale_bar(figure, axes, *bar)
+        heading(figure, moving.result, head)
     return figure
 
 
@@ -193,6 +220,16 @@ class MovingPart:
         if np.linalg.norm(high - low) < LAYOUT.ringed * size[0]:
             middle, radius = (low + high) / 2, 0.75 * LAYOUT.ringed * size[0]
             pen.ellipse([*(middle - radius), *(middle + radius)], outline=RED, width=width)
+        return np.asarray(picture)
+
+    def numbered(self, image: np.ndarray, points: np.ndarray) -> np.ndarray:
+        """An image of this camera with points (n, 3), as drawn, ringed and numbered."""
+        size, picture = (image.shape[1], image.shape[0]), Image.fromarray(image)
+        pen, radius = ImageDraw.Draw(picture), size[0] // 110
+        for number, point in enumerate(points, 1):
+            at = np.array(place(self.camera, point, size)) * size
+            pen.ellipse([*(at - radius), *(at + radius)], outline=RED, width=max(radius // 4, 1))
+            pen.text(tuple(at + radius), str(number), fill=RED, font_size=3 * radius)
         return np.asarray(picture)
 
     def factors(self, scale: float) -> str:

@@ -215,4 +215,4 @@ def _with_stress(result: Result, cycle: SolvedCycle, number: int) -> SolvedCycle
     """The cycle of a row or point with the stress of the whole part, where the result holds it."""
     field = result.stress_field
     stress = None if field is None or not field.spot.shape[1] else field.of(number)
-    return cycle if stress is None else replace(cycle, whole=lambda: stress)
+    return cycle if stress is None else replace(cycle, whole=lambda: stress, area=result.patch.area)

@@ -149,6 +149,7 @@ class Stress:
 
     row : (n_field,) rows of the wear history, points of the response curve where nothing wears
     largest, utilisation, mean, amplitude, tensor : (n_field, n_node, ...) as in hbm.fatigue.StressOverCycle
+    tension, watson, face_node : (n_field, n_pair) likewise
     spot, spot_point : (n_field, n_spot) nodes of the hot spots, the hottest first, (n_field, n_spot, 3) [m]
     spot_kind : (n_field, n_spot) what stands there, as numbers of fem.singularities.KINDS: other than 0 the exact
         stress is infinite"""
@@ -159,6 +160,9 @@ class Stress:
     mean: np.ndarray
     amplitude: np.ndarray
     tensor: np.ndarray
+    tension: np.ndarray
+    watson: np.ndarray
+    face_node: np.ndarray
     spot: np.ndarray
     spot_point: np.ndarray
     spot_kind: np.ndarray

@@ -89,6 +89,7 @@ SCHEMA: dict[str, tuple[type, Arrays]] = {
         ("stress_field", Stress, {
             "field": "row:#row", "field spot": "spot:#node spot_kind", "field spot xyz": "spot_point:m",
             "field node": "largest:Pa utilisation mean:Pa amplitude:Pa", "field node moment voigt": "tensor:Pa",
+            "field pair": "tension:Pa watson:Pa face_node:#node",
         }),
         ("loops", Loops, {"field": "row:#row", "field pair component sample": "displacement:m force:N"}),
     )

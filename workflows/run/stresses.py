@@ -1,21 +1,30 @@
 """Stress in a run: outputs at the places and gauges of a scene, what the material endures there, and whole fields."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, fields as fields_of, replace
 from functools import cached_property
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+from scipy.sparse import csr_matrix
 
 from tribodyn.fem.assembly import Assembly, materials_of
-from tribodyn.fem.constraints import find_group
-from tribodyn.fem.elasticity import element_materials
-from tribodyn.fem.elements import coordinates
-from tribodyn.fem.load_vectors import Load, temperature_at
+from tribodyn.fem.load_vectors import Heating, Load
 from tribodyn.fem.part import Part
 from tribodyn.fem.singularities import KINDS, singular_nodes
-from tribodyn.fem.stress import COMPONENTS, PartPoint, locate, nodal_stress, strain_row, stress_rows
+from tribodyn.fem.stress import (
+    COLUMNS,
+    COMPONENTS,
+    ROWS,
+    NodalStress,
+    PartPoint,
+    locate,
+    nodal_stress,
+    solids,
+    strain_row,
+    stress_rows,
+)
 from tribodyn.hbm.balance import HarmonicBalance, State
 from tribodyn.hbm.continuation.branch import GAUGE, STRESS
 from tribodyn.hbm.fatigue import (
@@ -23,6 +32,7 @@ from tribodyn.hbm.fatigue import (
     StressField,
     StressOverCycle,
     StressPlace,
+    face_indicators,
     haigh_point,
     over_cycle,
     utilisation,
@@ -34,6 +44,7 @@ from tribodyn.reduction.omitted_modes import OmittedModes
 from tribodyn.refusal import Refusal
 from tribodyn.workflows.result.result import Fields, Stress
 from tribodyn.workflows.run import part_reduction
+from tribodyn.workflows.run.scene_loads import make_load
 from tribodyn.workflows.scene.fields import unknown_key
 from tribodyn.workflows.scene.schema import MeshScene
 from tribodyn.workflows.scene.stress_tables import FatigueTable
@@ -47,8 +58,7 @@ class ObservedRow:
 
     values: np.ndarray
 
-    def vector(self, mesh: Any, node_sets: Mapping[str, np.ndarray], mass: Any = None) -> np.ndarray:
-        """The row."""
+    def vector(self, *_: Any) -> np.ndarray:
         return self.values
 
 
@@ -77,7 +87,7 @@ def with_stress(scene: MeshScene, part: Part, balance: HarmonicBalance, folder: 
     strengths = [
         next((strength_of(scene.fatigue[name]) for name in solid if name in scene.fatigue), None) for solid in known
     ]
-    heat = temperature(scene, part, folder)
+    heat, every = temperature(scene, part, folder), list(solids(part.mesh, material))
     places = []
     for name in scene.stress_places:
         place = _place(scene, part.mesh, name)
@@ -85,7 +95,8 @@ def with_stress(scene: MeshScene, part: Part, balance: HarmonicBalance, folder: 
         if heat is not None:
             held_back = tuple(stress_rows(part.mesh, material, place, heat)[1].tolist())
         first = names.index(f"{STRESS}{name}.{COMPONENTS[0]}")
-        strength = _strength(part.mesh, material, place, strengths)
+        at = (piece.node == place.piece.node and place.element in elements for piece, _, _, elements in every)
+        strength = strengths[[*at].index(True)]
         change = None if heat is None else heat[place.nodes] @ place.weights
         left = 1.0 if strength is None else float(strength.share(change))
         places.append(StressPlace(name, first, held_back, strength, left))
@@ -117,6 +128,34 @@ class PartStress:
     def kinds(self) -> np.ndarray:
         """What stands at every node, as numbers of fem.singularities.KINDS."""
         return singular_nodes(self.part)
+
+    @cached_property
+    def nodes_of_pairs(self) -> csr_matrix:
+        """(n_pair, n_node) 1 for the nodes of both faces near a pair; those in the next sector are left out."""
+        part, pairs, n_node = self.part, self.part.interface, len(self.part.points)
+        moves = csr_matrix(
+            (np.ones(len(part.free)), (part.free, np.arange(len(part.free)))), (3 * n_node, len(part.free))
+        )
+        row, dof = (abs(csr_matrix(pairs.B)) @ abs(moves if part.dependence is None else part.dependence).T).nonzero()
+        pair = np.append(row // len(pairs.components), np.arange(pairs.n_pair))
+        node = np.append(dof // 3, part.nodes)  # for pairs on a clamp
+        distance = np.linalg.norm(part.points[node] - pairs.points[pair], axis=1)
+        is_near = distance < 0.05 * np.linalg.norm(np.ptp(part.points, axis=0))
+        return csr_matrix((is_near.astype(float), (pair, node)), (pairs.n_pair, n_node)).sign()
+
+    def indicators_of_pairs(self, field: NodalStress, basis: HarmonicBasis) -> tuple[np.ndarray, ...]:
+        """Tension, number of Smith, Watson and Topper, and node of each pair (n_pair,), as in StressOverCycle."""
+        values, of_node = np.zeros((2, len(self.part.points))), self.nodes_of_pairs.tocsc()
+        for number, (_, _, kind, _) in enumerate(solids(self.part.mesh, self.material)):
+            rows = np.flatnonzero((field.material == number) & (np.diff(of_node.indptr) > 0)[field.node])
+            for at in np.array_split(rows, 1 + len(rows) // 256):
+                node = field.node[at]
+                frame = self.part.interface.frames[of_node.indices[of_node.indptr[node]]]
+                stiffness = kind.tensor(self.part.points[node])[:, ROWS, COLUMNS][:, :, ROWS, COLUMNS]
+                numbers = face_indicators(field.tensor[at], frame, np.linalg.inv(stiffness), basis)
+                values[:, node] = np.maximum(values[:, node], numbers)
+        at_pairs = [csr_matrix(self.nodes_of_pairs.multiply(value)) for value in values]
+        return *(each.max(axis=1).toarray().ravel() for each in at_pairs), at_pairs[0].argmax(axis=1).A1
 
     def singularity(self, where: int | str) -> str:
         """Point of a node or a named place, and what makes the exact stress infinite there; "" where nothing does."""
@@ -156,7 +195,7 @@ class PartStress:
                 of_rows = utilisation(field.tensor[at] / left, basis, strength, 64, point)
                 shown = np.flatnonzero(~(of_rows <= use[node]))
                 use[node[shown]], mean[node[shown]], amplitude[node[shown]] = of_rows[shown], *(x[shown] for x in point)
-        return StressOverCycle(stress, use, mean, amplitude, tensor)
+        return StressOverCycle(stress, use, mean, amplitude, tensor, *self.indicators_of_pairs(field, basis))
 
 
 def _place(scene: MeshScene, mesh: Any, name: str) -> PartPoint:
@@ -164,56 +203,31 @@ def _place(scene: MeshScene, mesh: Any, name: str) -> PartPoint:
     return locate(mesh, table.point, f"stress.places.{name}", table.body)
 
 
-def _strength(mesh: Any, material: Any, place: PartPoint, strengths: Sequence[Strength | None]) -> Strength | None:
-    """What the material endures at a place, out of those of all bodies; None where the scene does not say."""
-    first = 0
-    for piece, of_piece in materials_of(mesh, material):
-        kinds, kind_of = element_materials(piece.mesh, of_piece)
-        if piece.node == place.piece.node:
-            return strengths[first + int(kind_of[place.element])]
-        first += len(kinds)
-    return None
-
-
 def material_names(scene: MeshScene, mesh: Any, material: Any) -> list[tuple[str, ...]]:
     """Names by which [fatigue] may know each material of all bodies, body by body: its own, then that of the body."""
     names: list[tuple[str, ...]] = []
     for position, (_, of_piece) in enumerate(materials_of(mesh, material)):
         body = mesh.bodies[position].name if isinstance(mesh, Assembly) else ""
-        table = scene.bodies.get(body)
-        if table is None:
-            count = len(of_piece) if isinstance(of_piece, Mapping) else 1
-            names += [(body or SINGLE,)] * count
-        elif isinstance(table.material, str):
-            names.append((table.material, body))
+        if body not in scene.bodies:
+            names += [(body or SINGLE,)] * (len(of_piece) if isinstance(of_piece, Mapping) else 1)
         else:
-            names += [(name, body) for name in table.material.values()]
+            material = scene.bodies[body].material
+            names += [(name, body) for name in ([material] if isinstance(material, str) else material.values())]
     return names
 
 
 def strength_of(table: FatigueTable) -> Strength:
     """The strength of a table, surface and size in its endurance limits."""
-    factor = table.surface_factor * table.size_factor
-    torsion = None if table.torsion_limit is None else factor * table.torsion_limit
-    return Strength(
-        factor * table.endurance_limit, table.strength, table.yield_strength, table.diagram, torsion, table.knee,
-        table.exponent, table.temperatures,
-    )  # fmt: skip
+    values, limits = table.model_dump(), ("endurance_limit", "torsion_limit")
+    factor = values.pop("surface_factor") * values.pop("size_factor")
+    return Strength(**values | {name: factor * values[name] for name in limits if values[name] is not None})
 
 
 def temperature(scene: MeshScene, part: Part, folder: Path) -> np.ndarray | None:
     """Change of temperature (n_node,) [K] by the static loads of the scene; None where no load heats."""
-    change = None
-    for load in scene.loads.static.values():
-        if load.kind != "temperature":
-            continue
-        change = np.zeros(len(part.points)) if change is None else change
-        points = coordinates(part.mesh)
-        values = np.ones(len(points)) if load.field is None else temperature_at(folder / load.field, points)
-        heated = [find_group(part.node_sets, body) for body in load.bodies] or [np.arange(len(change))]
-        for nodes in heated:
-            change[nodes] += load.amplitude * values[nodes]
-    return change
+    loads = [(load.amplitude, make_load(load, part.mesh, None, folder)) for load in scene.loads.static.values()]
+    changes = [value * load.temperature(part.mesh) for value, load in loads if isinstance(load, Heating)]
+    return np.sum(changes, axis=0) if changes else None
 
 
 def stress_state(stress: StressField, points: np.ndarray, fields: Fields, basis: HarmonicBasis, spots: int) -> Stress:
