@@ -15,7 +15,6 @@ from tribodyn.fem.part import build
 from tribodyn.fem.stress import COLUMNS, ROWS, locate, nodal_stress, strain_row, stress_rows
 from tribodyn.hbm.fatigue import face_indicators, von_mises
 from tribodyn.hbm.harmonics import HarmonicBasis
-from tribodyn.refusal import Refusal
 
 
 def as_tensor(stress):
@@ -23,7 +22,7 @@ def as_tensor(stress):
     return stress[..., [[0, 5, 4], [5, 1, 3], [4, 3, 2]]]
 
 
-def displaced(mesh, sets, clamped, load, temperature=None):
+def displaced(mesh, sets, clamped, load):
     """Displacement (n_node, 3) under a load with clamps (group, axes)."""
     part = build(mesh, sets, STEEL, [Clamp(*each) for each in clamped], [], {"load": load}, {})
     return part.field(factorise(part.system.stiffness).solve(part.system.loads["load"]))
@@ -190,12 +189,6 @@ def test_materials_of_a_body_are_not_averaged():
     for number, material in enumerate((soft, stiff)):
         np.testing.assert_allclose(result.tensor[result.material == number, 0], 1e-3 * material.E, rtol=1e-9)
     assert len(result.node) > mesh.doflocs.shape[1]  # nodes between them stand there twice
-
-
-def test_a_place_outside_is_refused():
-    mesh, _ = brick([0, 1.0], [0, 1.0], [0, 1.0])
-    with pytest.raises(Refusal, match=r"800 mm outside the part: give a point of it, such as the nearest, \(1000, 5"):
-        locate(mesh, (1.8, 0.5, 0.5), "stress.places.fillet")
 
 
 @pytest.fixture(scope="module")

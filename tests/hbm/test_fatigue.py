@@ -10,7 +10,6 @@ from tribodyn.hbm.fatigue import (
     equivalent_amplitude,
     equivalent_mean,
     largest_von_mises,
-    over_cycle,
     utilisation,
 )
 from tribodyn.hbm.harmonics import HarmonicBasis
@@ -82,9 +81,3 @@ def test_heat_weakens_all_strengths():
     warm = StressPlace("root", 0, strength=strength, weakening=0.5)
     assert strength.share(np.array([-5.0, 50.0])) == pytest.approx([1.0, 0.5])
     assert warm.utilisation(cycle(60.0, 40.0), BASIS) == pytest.approx(80 / (200 * (1 - 120 / 600)))
-
-
-def test_samples_are_those_of_the_cycle():
-    basis = HarmonicBasis((0, 1, 3), 64)
-    coefficients = np.random.default_rng(1).standard_normal((2, 6, basis.n_coeff))
-    np.testing.assert_allclose(over_cycle(coefficients, basis, 64), np.swapaxes(basis.to_time(coefficients), -1, -2))
