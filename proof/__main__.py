@@ -58,6 +58,7 @@ def scoreboard(
     seed: int = 1,
     seconds: float = 60.0,
     wear: Flag = False,
+    modes: Flag = False,
     out: Path = Path("scoreboard"),
     as_json: Json = False,
 ) -> None:
@@ -75,12 +76,19 @@ def scoreboard(
         Processor seconds that the run of a scene may take, and its reference again.
     wear
         Scenes that all wear, along their motion in time.
+    modes
+        Their stress with 20, 40 and 80 modes beside nearly all of them instead, and whether its stated errors hold.
     out
         Folder of the rows, the table and the histogram.
     as_json
         Print JSON for machines."""
-    from proof.unseen_scenes import scoreboard as board, scoreboard_table as table
+    from proof.unseen_scenes import scoreboard as board, scoreboard_table as table, stress_modes
 
+    if modes:
+        ladders = stress_modes.run(scenes, seed, report_progress)
+        arrays = [(name, changes.tolist(), stated.tolist()) for name, changes, stated in ladders]
+        print(json.dumps(arrays, indent=2) if as_json else stress_modes.as_text(ladders))
+        return
     make_room(out)
     rows = board.run(scenes, seed, out, seconds, report_progress, wear)
     table.write(rows, out)
@@ -239,19 +247,7 @@ def wear(*, scenes: int = 12, seconds: float = 60.0, as_json: Json = False) -> N
 
 
 app = cyclopts.App(name="prove", help="Proofs of tribodyn: speed, extremes, faults, errors of unseen scenes.")
-for word in (
-    bench,
-    extremes,
-    faults,
-    scoreboard,
-    branches,
-    fuzz,
-    wear,
-    wear_steps,
-    blade,
-    leaf,
-    rig,
-):
+for word in (bench, extremes, faults, scoreboard, branches, fuzz, wear, wear_steps, blade, leaf, rig):
     app.command(word)
 
 

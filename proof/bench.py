@@ -211,28 +211,16 @@ def _measure(balance: HarmonicBalance, harmonics: str, windows: tuple[int, int],
         difference = float(np.maximum(difference, np.abs(polished - exact).max() / np.abs(exact).max()))
     p = dense.profile
     return Timing(
-        harmonics=harmonics,
-        points=len(branch.omega),
-        converged=int(branch.converged.sum()),
-        unknowns=balance.n_unknown,
-        dense_unknowns=balance.model.system.n_dof * balance.basis.n_coeff,
-        seconds=float(per_point.sum()),
-        repeat_difference=abs(halves[0] - halves[1]) / min(halves),
-        newton_steps=int(branch.newton_steps.sum()),
-        ratio=dense_seconds / own_seconds if own_seconds else None,
-        dense_points=count * length - lost,
-        dense_lost=lost,
-        dense_seconds=dense_seconds,
-        max_difference=difference,
-        contact=shares["contact"],
-        balance=shares["balance"],
-        direction=shares["direction"],
+        harmonics=harmonics, points=len(branch.omega), converged=int(branch.converged.sum()),
+        unknowns=balance.n_unknown, dense_unknowns=balance.model.system.n_dof * balance.basis.n_coeff,
+        seconds=float(per_point.sum()), repeat_difference=abs(halves[0] - halves[1]) / min(halves),
+        newton_steps=int(branch.newton_steps.sum()), ratio=dense_seconds / own_seconds if own_seconds else None,
+        dense_points=count * length - lost, dense_lost=lost, dense_seconds=dense_seconds, max_difference=difference,
+        contact=shares["contact"], balance=shares["balance"], direction=shares["direction"],
         dense_inversion=p.inversion / max(p.contact + p.balance + p.inversion, 1e-300),
-        thesis_seconds=THESIS_SECONDS.get(harmonics),
-        work=work,
-        products=shares["apply"] + shares["product"],
+        thesis_seconds=THESIS_SECONDS.get(harmonics), work=work, products=shares["apply"] + shares["product"],
         roofline=sum(map(machine.seconds, work)),
-    )
+    )  # fmt: skip
 
 
 def _timed(

@@ -123,18 +123,10 @@ def _measure(problem: WearProblem, delta: float, rule: str, step: float, say: Ca
     life = cycles_to_preload(worn)
     say(f"{rule} {step:g}: {len(worn.cycles)} wear steps, {seconds:.1f} s, {worn.end}")
     return WearStepRow(
-        rule=rule,
-        step=step,
-        hbm_solves=int(worn.solves.sum()),
-        wear_steps=len(worn.cycles) - 1,
-        seconds=seconds,
-        depth_m=_depth_at_life(worn, life),
-        depth_error=None,
-        life=float("nan") if life is None else life,
-        life_error=None,
-        roughness=roughness(problem.balance.model.interface.points, worn.depth[-1]),
-        end=str(worn.end),
-    )
+        rule=rule, step=step, hbm_solves=int(worn.solves.sum()), wear_steps=len(worn.cycles) - 1, seconds=seconds,
+        depth_m=_depth_at_life(worn, life), depth_error=None, life=float("nan") if life is None else life,
+        life_error=None, roughness=roughness(problem.balance.model.interface.points, worn.depth[-1]), end=str(worn.end),
+    )  # fmt: skip
 
 
 def _depth_at_life(worn: WearHistory, life: float | None) -> float:

@@ -41,12 +41,7 @@ def summary(rows: Sequence[Row]) -> str:
         f"{'quantity':15} {'errors':>8} {'violated':>8} {'median overestimate':>19} {'not stated':>10} {'not known':>9}"
     )
     for quantity in (*names_with_error(), None):
-        of = [
-            statement
-            for row in rows
-            for statement in row.judged
-            if quantity in (None, statement.quantity) and statement.value is not None
-        ]
+        of = [s for row in rows for s in row.judged if quantity in (None, s.quantity) and s.value is not None]
         if not of:  # such as stress, which no drawn scene asks for
             continue
         ratios = overestimates(rows, quantity)
@@ -79,18 +74,9 @@ def write(rows: Sequence[Row], folder: Path) -> None:
         table.writerow(COLUMNS)
         for row in rows:
             about = (row.number, row.family, row.n_pair, row.harmonics)
-            table.writerows(
-                (
-                    *about,
-                    statement.quantity,
-                    statement.value,
-                    statement.error if statement.stated else None,
-                    statement.true,
-                    statement.dominated_by,
-                )
-                for statement in row.judged
-                if statement.value is not None
-            )
+            for s in (statement for statement in row.judged if statement.value is not None):
+                error = s.error if s.stated else None
+                table.writerow((*about, s.quantity, s.value, error, s.true, s.dominated_by))
     picture(rows).savefig(folder / "scoreboard.png")
 
 

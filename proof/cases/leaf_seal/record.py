@@ -60,30 +60,13 @@ def row(case: Case, response: LeafResponse) -> dict[str, Any]:
     folds = [f"{branch.frequency[i]:.2f}" for i in branch.folds]
     patches, pins = (1e6 * WEAR_CYCLES * rates.max() for rates in response.wear_rates(point))
     count = {kind: int(np.sum(status == kind)) for kind in (STICKS, STICKS | SEPARATES, SEPARATES)}
-    return dict(
-        zip(
-            COLUMNS,
-            (
-                case.group,
-                case.label,
-                len(branch.omega),
-                len(folds),
-                " ".join(folds),
-                int(np.sum(~response.stability.stable)),
-                round(float(branch.frequency[height.argmax()]), 2),
-                round(1e6 * float(height.max()), 1),
-                *count.values(),
-                round(1e3 * float(chattering.impact_velocity.max()), 1),
-                round(float(chattering.touching.min()), 3),
-                round(1e3 * float(response.impact_work(point).sum()), 4),
-                round(1e3 * sum(response.pin_work(point).values()), 4),
-                round(float(patches), 3),
-                round(float(pins), 3),
-                int(branch.newton_steps.sum()),
-                round(response.seconds, 2),
-                branch.ended.name,
-                str(branch.end),
-            ),
-            strict=True,
-        )
-    )
+    values = (
+        case.group, case.label, len(branch.omega), len(folds), " ".join(folds),
+        int(np.sum(~response.stability.stable)), round(float(branch.frequency[height.argmax()]), 2),
+        round(1e6 * float(height.max()), 1), *count.values(),
+        round(1e3 * float(chattering.impact_velocity.max()), 1), round(float(chattering.touching.min()), 3),
+        round(1e3 * float(response.impact_work(point).sum()), 4),
+        round(1e3 * sum(response.pin_work(point).values()), 4), round(float(patches), 3), round(float(pins), 3),
+        int(branch.newton_steps.sum()), round(response.seconds, 2), branch.ended.name, str(branch.end),
+    )  # fmt: skip
+    return dict(zip(COLUMNS, values, strict=True))
