@@ -100,8 +100,8 @@ class Equation:
 
     def build(self, mesh: Any, node_sets: Mapping[str, np.ndarray]) -> Dependence:
         """The first displacement in terms of the others; raises Refusal where its factor is zero."""
-        if len(self.terms) < 2 or not self.terms[0][2]:
-            raise Refusal(f"{self.label} needs two terms or more, the first with a factor that is not zero")
+        if len({term[:2] for term in self.terms}) < max(len(self.terms), 2) or not self.terms[0][2]:
+            raise Refusal(f"{self.label} needs two terms or more of different displacements, the first not times zero")
         dofs = [3 * int(find_group(node_sets, group)[0]) + axis for group, axis, _ in self.terms]
         factors = [-factor / self.terms[0][2] for _, _, factor in self.terms[1:]]
         row = coo_matrix((factors, ([0] * len(factors), dofs[1:])), shape=(1, 3 * mesh.doflocs.shape[1]))

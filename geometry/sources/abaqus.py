@@ -54,7 +54,7 @@ class Scope:
 
     nsets, elsets : name -> its items as written: labels, or names of other sets, perhaps with "instance." before them
     surfaces : name -> (kind, items); names : capitals -> as written; unsorted : sets in the order of the deck
-    cards : that name nodes or faces of this scope"""
+    lumped : cards of masses and springs; cards : that name nodes or faces of this scope"""
 
     nodes: dict[int, tuple[float, float, float]] = field(default_factory=dict)
     elements: dict[int, tuple[str, tuple[int, ...]]] = field(default_factory=dict)
@@ -63,8 +63,7 @@ class Scope:
     surfaces: dict[str, tuple[str, list[tuple[str, str]]]] = field(default_factory=dict)
     names: dict[str, str] = field(default_factory=dict)
     sections: list[Card] = field(default_factory=list)
-    masses: list[tuple[str, float]] = field(default_factory=list)
-    springs: list[Card] = field(default_factory=list)
+    lumped: list[Card] = field(default_factory=list)
     orientations: dict[str, Card] = field(default_factory=dict)
     distributions: dict[str, Card] = field(default_factory=dict)
     unsorted: set[str] = field(default_factory=set)
@@ -149,10 +148,10 @@ def load(path: Path) -> DeckAssembly:
         assembly.skipped.check_parameters(card.name, card.options)
         if "INPUT" in card.options and card.name in TABLE.reads - {*WITH_INPUT}:
             raise Refusal(f"{card.where} has its data in another file by INPUT, not read here: write them in the deck")
-        names = TABLE.fields.get(card.name, ANY)
-        for line in card.data if not names.endswith(ANY) else ():
-            if len(line) > names.count(",") + 1:
-                assembly.skipped.check_fields(card.name, line)
+        if not (names := TABLE.fields.get(card.name, ANY)).endswith(ANY):
+            for k, line in enumerate(card.data):
+                if ";" in names or len(line) > names.count(",") + 1:
+                    assembly.skipped.check_fields(card.name, line, k)
         if card.name == "PART":
             flat = False
             scope = parts[card.option("NAME").upper()] = Scope()
@@ -206,12 +205,6 @@ def _surface(card: Card, scope: Scope) -> None:
     scope.surfaces[scope.name(card.option("NAME"))] = (kind, items)
 
 
-def _mass(card: Card, scope: Scope) -> None:
-    if not card.data:
-        raise Refusal(f"{card.where} has no mass: write it below")
-    scope.masses.append((card.option("ELSET"), card.number(card.data[0][0])))
-
-
 def _system(card: Card, scope: Scope) -> None:
     """Where the nodes that follow are placed: a translation, or three points."""
     if not card.data:
@@ -239,7 +232,9 @@ def _nodes(card: Card, scope: Scope) -> None:
         places = System(kinds[letter], np.zeros(3), np.eye(3)).places(places)
     if scope.system is not None:
         places = scope.system.places(places)
-    scope.nodes |= {label: (x, y, z) for label, (x, y, z) in zip(labels, places.tolist(), strict=True)}
+    for label, (x, y, z) in zip(labels, places.tolist(), strict=True):
+        if scope.nodes.setdefault(label, (x, y, z)) != (x, y, z):
+            raise Refusal(f"{card.where} has node {label} again, at another place: take one of the two out")
     if card.option("NSET"):
         scope.nsets.setdefault(scope.name(card.option("NSET")), []).extend(map(str, labels))
 
@@ -252,8 +247,13 @@ def _elements(card: Card, scope: Scope) -> None:
     for line in card.data:
         numbers += [card.integer(text) for text in line if text]
         if count is None or len(numbers) > count:
-            if count is not None or numbers[0] not in scope.elements:
-                scope.elements[numbers[0]] = (kind, tuple(numbers[1:]))
+            element = (kind, tuple(numbers[1:]))
+            if count is not None and len(numbers) > count + 1:
+                raise Refusal(
+                    f"{card.where} has element {numbers[0]} with more nodes than {kind} has: correct the type"
+                )
+            if scope.elements.setdefault(numbers[0], element) != element:
+                raise Refusal(f"{card.where} has element {numbers[0]} again, with other nodes: take one of the two out")
             labels.append(str(numbers[0]))
             numbers = []
     if numbers:
@@ -305,10 +305,9 @@ MESH_CARDS: dict[str, Callable[[Card, Scope], None]] = {
     "NSET": _set,
     "ELSET": _set,
     "SURFACE": _surface,
-    "MASS": _mass,
     "SYSTEM": _system,
     "SOLID SECTION": lambda card, scope: scope.sections.append(card),
-    "SPRING": lambda card, scope: scope.springs.append(card),
+    **dict.fromkeys(("MASS", "SPRING"), lambda card, scope: scope.lumped.append(card)),
     "ORIENTATION": lambda card, scope: scope.orientations.update({card.option("NAME").upper(): card}),
     "DISTRIBUTION": lambda card, scope: scope.distributions.update({card.option("NAME").upper(): card}),
     **dict.fromkeys(GENERATORS, _generator),

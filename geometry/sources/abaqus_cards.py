@@ -1,6 +1,5 @@
 """Constraints, springs, masses, loads and supports of a deck of Abaqus or CalculiX."""
 
-from collections.abc import Iterator
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -82,9 +81,9 @@ class _Cards(MaterialCards):
                 if next_line is None:
                     raise Refusal(f"{card.where} ends before its {count} terms: the deck is cut off")
                 fields += [text for text in next_line if text]
-            terms = [
-                (fields[i], card.integer(fields[i + 1]) - 1, card.number(fields[i + 2])) for i in range(0, 3 * count, 3)
-            ]
+            if count < 1 or len(fields) > 3 * count:
+                raise Refusal(f"{card.where} has {len(fields)} fields for its {count} terms: correct their number")
+            terms = [(fields[i], card.axis(fields[i + 1]), card.number(fields[i + 2])) for i in range(0, 3 * count, 3)]
             members = [self._rows(place, card) for place, _, _ in terms]
             counts = sorted({len(rows) for rows in members} | {len(members[0])})
             if len(set(counts) - {1}) > 1 or (counts != [1] and len(members[0]) == 1):
@@ -101,14 +100,16 @@ class _Cards(MaterialCards):
                     )
                 )
 
-    def _coupling(self, card: Card) -> None:
+    def _coupling(self, card: Card | None) -> None:
+        if self.coupling is not None:
+            self._refused(self.coupling, "without *KINEMATIC or *DISTRIBUTING")
         self.coupling = card
 
     def _kinematic(self, card: Card) -> None:
         head, self.coupling = self.coupling, None
         if head is None:
             raise Refusal(f"{card.where} needs a *COUPLING before it: add its head")
-        axes = sorted({axis for line in card.data for axis in _axes(card, line)})
+        axes = sorted({axis for line in card.data for axis in self._axes(card, line)})
         self.couplings.append(
             deck.Coupling(
                 head.option("CONSTRAINTNAME") or f"coupling{len(self.couplings) + 1}",
@@ -142,7 +143,7 @@ class _Cards(MaterialCards):
     def _kinematic_coupling(self, card: Card) -> None:
         point = self._reference(card.option("REFNODE"), card)
         for line in card.data:
-            axes = tuple(_axes(card, line[1:])) or (0, 1, 2, 3, 4, 5)
+            axes = tuple(self._axes(card, line[1:])) or (0, 1, 2, 3, 4, 5)
             name = f"coupling{len(self.couplings) + 1}"
             self.couplings.append(deck.Coupling(name, "kinematic", point, self._place(line[0], card), axes))
 
@@ -190,8 +191,8 @@ class _Cards(MaterialCards):
         single: dict[tuple[tuple[int, ...], float], list[int]] = {}
         for line in card.data:
             kind = (line[1] if len(line) > 1 else "").upper()
-            value = card.number(line[3]) if len(line) > 3 and kind not in NAMED_SUPPORTS else 0.0
-            axes = NAMED_SUPPORTS.get(kind) or tuple(_axes(card, line[1:3]))
+            value = card.number(line[3]) if len(line) > 3 else 0.0
+            axes = NAMED_SUPPORTS.get(kind) or tuple(self._axes(card, line[1:3]))
             if not kind:
                 raise Refusal(f"{card.where} names no direction of '{line[0]}': complete the line")
             if self.is_turned and not {0, 1, 2} <= set(axes):
@@ -240,15 +241,27 @@ class _Cards(MaterialCards):
     def _contact_pair(self, card: Card) -> None:
         for line in card.data:
             self.unused.append(f"contact pair {' on '.join(line)}, which the scene gives as [contacts.NAME]")
-            with suppress(Refusal):  # of faces of what is no solid
-                slave, master = (self._place(name, card, face=True) for name in line)
+            with suppress(Refusal):  # of faces of what is no solid; one name is a surface that touches itself
+                slave, master = (self._place(name, card, face=True) for name in (line * 2)[:2])
                 friction = self.frictions.get(card.option("INTERACTION").upper())
                 self.contacts.append(deck.DeckTie(" on ".join(line), slave, master, friction=friction))
+
+    def _axes(self, card: Card, fields: list[str]) -> range:
+        """Axes 0..5 from a first and a last one, counted from 1 in the deck."""
+        numbers = [card.integer(text) for text in fields if text]
+        if not numbers:
+            return range(0)
+        if not 1 <= numbers[0] <= numbers[-1]:
+            raise Refusal(f"{card.where} names the directions {numbers[0]} to {numbers[-1]}: count up from 1")
+        if numbers[0] > 6:
+            self._refused(card, f"direction {numbers[0]}")
+        return range(numbers[0] - 1, min(numbers[-1], 6))
 
     # the end
 
     def finished(self) -> RawMesh:
         """The mesh with everything that the cards give."""
+        self._coupling(None)
         solid = self.solid
         content = deck.Deck(
             tuple(self._with_groups()),
@@ -284,41 +297,3 @@ class _Cards(MaterialCards):
             refused={**self.raw.refused, **self.skipped.refused},
             notes=[*self.raw.notes, *notes],
         )
-
-    def _springs(self) -> Iterator[deck.DeckSpring]:
-        for instance, scope in {**self.assembly.instances, "": self.assembly.top}.items():
-            for card in scope.springs:
-                if not card.data:
-                    self._refused(card, "no stiffness")
-                    continue
-                axes = [card.integer(text) - 1 for line in card.data[:-1] for text in line if text]
-                for where, label in self.assembly.elements(card.option("ELSET"), instance):
-                    kind, nodes = self.assembly.scope(where).elements[label]
-                    rows = [self.row[where, node] for node in nodes]
-                    if kind == "SPRINGA":
-                        direction = np.subtract(*self.raw.points[rows[::-1]])
-                        factors = direction / np.linalg.norm(direction)
-                        terms = [
-                            (r, k, s * f) for r, s in zip(rows, (-1, 1), strict=True) for k, f in enumerate(factors)
-                        ]
-                    else:
-                        terms = [(r, axis, s) for r, axis, s in zip(rows, axes, (1.0, -1.0), strict=False)]
-                    terms_of_nodes = tuple((*self._dof(r, axis), float(factor)) for r, axis, factor in terms if factor)
-                    yield deck.DeckSpring(terms_of_nodes, card.number(card.data[-1][0]))
-
-    def _masses(self) -> Iterator[deck.PointMass]:
-        for instance, scope in {**self.assembly.instances, "": self.assembly.top}.items():
-            for elset, value in scope.masses:
-                for where, label in self.assembly.elements(elset, instance):
-                    node = self.assembly.scope(where).elements[label][1][0]
-                    yield deck.PointMass(self._node(self.row[where, node]), value)
-
-
-def _axes(card: Card, fields: list[str]) -> range:
-    """Axes 0..5 from a first and a last one, counted from 1 in the deck."""
-    numbers = [card.integer(text) for text in fields if text]
-    if not numbers:
-        return range(0)
-    if not 1 <= numbers[0] <= numbers[-1]:
-        raise Refusal(f"{card.where} names the directions {numbers[0]} to {numbers[-1]}: count up from 1")
-    return range(numbers[0] - 1, min(numbers[-1], 6))

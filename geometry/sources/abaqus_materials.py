@@ -1,4 +1,4 @@
-"""Materials of an Abaqus or CalculiX deck: constants, and the directions of the bodies made of them."""
+"""Materials of an Abaqus or CalculiX deck, the directions of bodies made of them, springs and point masses."""
 
 from collections.abc import Iterator
 from contextlib import suppress
@@ -15,7 +15,7 @@ from tribodyn.refusal import Refusal
 
 @dataclass
 class MaterialCards(DeckPlaces):
-    """Cards of materials and sections.
+    """Cards of materials, sections, masses and springs.
 
     materials : name in capitals -> material; material : name of the one whose cards follow
     warm : (n_point,) initial temperature of each point, NaN where none is given"""
@@ -77,7 +77,10 @@ class MaterialCards(DeckPlaces):
     def _give(self, card: Card, **values: object) -> None:
         if self.material not in self.materials:
             raise Refusal(f"{card.where} stands before any *MATERIAL: move it below its material")
-        self.materials[self.material] = replace(self.materials[self.material], **values)  # type: ignore[arg-type]
+        item = self.materials[self.material]
+        if any(getattr(item, name) not in (None, (), value) for name, value in values.items() if name != "tabulated"):
+            raise Refusal(f"{card.where} gives another value of material '{item.name}' than before: take one out")
+        self.materials[self.material] = replace(item, **values)  # type: ignore[arg-type]
 
     def _surface_interaction(self, card: Card) -> None:
         self.interaction = card.option("NAME").upper()
@@ -169,6 +172,46 @@ class MaterialCards(DeckPlaces):
                 axes_of[[self.number[key] for key in named if key in self.number]] = len(axes)
             axes.append(local @ orthogonal(*points) @ turn.T)
         return ElementAxes(centres[mine], np.array(axes)[axes_of[mine]])
+
+    # masses and springs
+
+    def _springs(self) -> Iterator[deck.DeckSpring]:
+        for card, kind, rows in self._members("SPRING"):
+            axes = [card.axis(text) for line in card.data[:-1] for text in line if text]
+            if len(axes) != {"SPRING1": 1, "SPRING2": 2}.get(kind, 0) or any(card.data[-1][1:]):
+                self._refused(card, f"of {kind} with other numbers than its directions and a stiffness")
+                continue
+            terms = [(r, axis, s) for r, axis, s in zip(rows, axes, (1.0, -1.0), strict=False)]
+            if kind == "SPRINGA":
+                direction = np.subtract(*self.raw.points[rows[::-1]])
+                if not direction.any():
+                    raise Refusal(f"{card.where} has a SPRINGA between nodes at one place: take a SPRING2")
+                factors = direction / np.linalg.norm(direction)
+                terms = [(r, k, s * f) for r, s in zip(rows, (-1, 1), strict=True) for k, f in enumerate(factors)]
+            terms_of_nodes = tuple((*self._dof(r, axis), float(factor)) for r, axis, factor in terms if factor)
+            yield deck.DeckSpring(terms_of_nodes, card.number(card.data[-1][0]))
+
+    def _masses(self) -> Iterator[deck.PointMass]:
+        for card, _, rows in self._members("MASS"):
+            yield deck.PointMass(self._node(rows[0]), card.number(card.data[0][0]))
+
+    def _members(self, name: str) -> Iterator[tuple[Card, str, list[int]]]:
+        """Card, type and points of each element that a card of a name is for; one that has no card is refused."""
+        scopes = {**self.assembly.instances, "": self.assembly.top}
+        elements = {(where, label): kind for where, of in scopes.items() for label, (kind, _) in of.elements.items()}
+        lone = {key: kind for key, kind in elements.items() if kind.startswith(name)}
+        for instance, card in ((instance, card) for instance, scope in scopes.items() for card in scope.lumped):
+            if not card.data:
+                raise Refusal(f"{card.where} has no mass or stiffness: write it below")
+            for where, label in self.assembly.elements(card.option("ELSET"), instance) if card.name == name else ():
+                kind, nodes = self.assembly.scope(where).elements[label]
+                lone.pop((where, label), None)
+                if kind.startswith(name):
+                    yield card, kind, [self.row[where, node] for node in nodes]
+                else:
+                    self._refused(card, f"of elements of type {kind}")
+        for kind in sorted(set(lone.values())):
+            self.skipped.refuse(f"elements of type {kind} without *{name}")
 
 
 def engineering_constants(D: list[float]) -> tuple[float, ...]:

@@ -56,9 +56,10 @@ class DeckPlaces:
         """Points of a node or a set in its order."""
         try:
             rows = [self.row[node] for node in self.assembly.ordered_nodes(self._qualified(text))]
-        except KeyError:
+        except KeyError as missing:
+            lost = f" with node {missing.args[0][1]}" if isinstance(missing.args[0], tuple) else ""
             raise Refusal(
-                f"{card.where} names '{text}', which is no node and no set of the deck: correct the name or add the set"
+                f"{card.where} names '{text}'{lost}, which is no node and no set of the deck: correct it or add it"
             ) from None
         if not rows:
             raise Refusal(f"{card.where} names the set '{text}', which is empty: fill it, or take the line out")

@@ -161,7 +161,7 @@ class _Sets:
         for nodes, faces in chosen_elements(self.blocks, numbers):
             if face in ("", "SPOS"):
                 corners_of_faces += [nodes[:, list(corners)] for corners in faces]
-            elif face[1:].isdigit() and 1 <= int(face[1:]) <= len(faces):
+            elif face[0] == "S" and face[1:].isdigit() and 1 <= int(face[1:]) <= len(faces):
                 corners_of_faces.append(nodes[:, list(faces[int(face[1:]) - 1])])
             else:
                 self.unused.append(f"face {face} of {len(nodes)} elements of surface '{name}', which they have not")

@@ -16,6 +16,7 @@ from tribodyn.geometry.sources.card_table import CardTable, SkippedCards, fields
 from tribodyn.geometry.sources.directions import ElementAxes, System
 from tribodyn.geometry.sources.raw_mesh import LabelledMesh, RawMesh, Terms
 from tribodyn.refusal import Refusal
+from tribodyn.text_file import finite
 
 _AXES = {"UX": 0, "UY": 1, "UZ": 2, "ROTX": 3, "ROTY": 4, "ROTZ": 5}
 _FORCES = {"FX": 0, "FY": 1, "FZ": 2, "MX": 3, "MY": 4, "MZ": 5}
@@ -33,8 +34,9 @@ def read(path: Path) -> RawMesh:
 class _Archive(ArchiveMesh):
     """A file that is read line by line.
 
-    constants : of materials by number; systems : local ones
-    equations : by name; equation : that of the last; first_coupled : set of CP -> its first node
+    i : the next line; types, options : of elements, by the number of their kind; constants : of materials by name
+    systems : local ones; of_solids : volume group -> its material and local system; node_axes : node -> its axes
+    equations : by number, and the number of the last; alike : set of CP -> its first node
     loads : on nodes, along axes that may be turned"""
 
     constants: dict[int, dict[str, float]] = field(default_factory=dict)
@@ -107,15 +109,15 @@ class _Archive(ArchiveMesh):
         """A constant of a material, or a table of it over the temperature, which has to be constant."""
         if words[0].upper() == "MP":
             label, number, values = words[1], words[2], words[3:]
-            is_constant = not any(float(value or 0) for value in values[1:])
+            is_constant = not any(finite(value) for value in values[1:])
         else:
             label, number, values = words[3], words[4], [value for value in words[6:] if value]
-            is_constant = len(set(map(float, values))) <= 1
+            is_constant = len(set(map(finite, values))) <= 1
         label = label.upper()
         if not is_constant:
             self.mesh.skipped.refuse(f"MP, {label} that depends on the temperature")
         elif label in CONSTANTS:
-            self.constants.setdefault(int(number), {})[label] = float(values[0])
+            self.constants.setdefault(int(number), {})[label] = finite(values[0])
         else:
             self.mesh.skipped.skip(f"MP {label}")
 
@@ -155,13 +157,13 @@ class _Archive(ArchiveMesh):
         unknown = [label for label in labels if label not in (*_AXES, "ALL")]
         axes = range(6) if "ALL" in labels else [_AXES[label] for label in labels if label in _AXES]
         for node in self._nodes(words, unknown):
-            self.mesh.hold(node, axes, float(words[3] or 0))
+            self.mesh.hold(node, axes, finite(words[3]))
 
     def f(self, words: list[str]) -> None:
         """A force or a moment on nodes."""
         label = words[2].upper()
         nodes = self._nodes(words, [] if label in _FORCES else [label])
-        self.loads += [(node, _FORCES[label], float(words[3] or 0)) for node in nodes if label in _FORCES]
+        self.loads += [(node, _FORCES[label], finite(words[3])) for node in nodes if label in _FORCES]
 
     def _nodes(self, words: list[str], unknown: list[str]) -> list[int]:
         """Nodes of a support or force: ALL, a component, or a node and those up to NEND in steps of NINC."""
@@ -174,7 +176,7 @@ class _Archive(ArchiveMesh):
             ]
         else:
             nodes = self.mesh.node_sets.get(words[1], [])
-        if unknown or not nodes or float(words[4] or 0):
+        if unknown or not nodes or finite(words[4]):
             wrong = unknown[0] if unknown else f"{words[4]}, an imaginary part" if nodes else words[1]
             self.mesh.skipped.refuse(f"{words[0].upper()}, {wrong}")
         return nodes
@@ -192,13 +194,13 @@ class _Archive(ArchiveMesh):
         if number not in self.equations:
             self.equations[number] = []
             self.mesh.equations.append(self.equations[number])
-        if float(constant or 0):
+        if finite(constant):
             self.mesh.skipped.refuse("CE, a constant term")
         for node, label, factor in zip(terms[::3], terms[1::3], terms[2::3], strict=False):
             if node and label.upper() not in _AXES:
                 self.mesh.skipped.refuse(f"CE, {label}")
             elif node:
-                self.equations[number].append((int(node), _AXES[label.upper()], float(factor or 0)))
+                self.equations[number].append((int(node), _AXES[label.upper()], finite(factor)))
 
     def cp(self, words: list[str]) -> None:
         """Displacements that are alike."""
@@ -215,7 +217,7 @@ class _Archive(ArchiveMesh):
 
 
 def _floats(words: list[str]) -> list[float]:
-    return [float(word or 0) for word in (words + [""] * 3)[:3]]
+    return [finite(word) for word in (words + [""] * 3)[:3]]
 
 
 CONSTANTS = words("EX, EY, EZ, DENS, ALPX, ALPY, ALPZ") | {f"{of}{at}" for of in ("NU", "PR", "G") for at in _PAIRS}

@@ -3,7 +3,7 @@
 Bricks with nodes that coincide are the tetrahedra, prisms and pyramids that they stand for."""
 
 import re
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import NoReturn
@@ -13,6 +13,7 @@ import numpy as np
 from tribodyn.geometry.sources.directions import axis_rotation
 from tribodyn.geometry.sources.raw_mesh import LabelledMesh
 from tribodyn.refusal import Refusal
+from tribodyn.text_file import finite
 
 
 @dataclass
@@ -41,7 +42,7 @@ class ArchiveMesh:
     def n(self, words: list[str]) -> None:
         """A node by a command; the end of a block of nodes is one without a number."""
         if words[1].isdigit():
-            self._node(int(words[1]), [float(word or 0) for word in words[2:8]])
+            self._node(int(words[1]), [finite(word) for word in words[2:8]])
 
     def _node(self, label: int, values: list[float]) -> None:
         x, y, z, *angles = (values + [0.0] * 6)[:6]
@@ -63,8 +64,11 @@ class ArchiveMesh:
             if kind not in SOLID_TYPES:
                 self._no_solid(number, kind)
                 continue
-            if kind in LAYERED and self.options.get(number, {}).get(3) == "1":
-                self.mesh.skipped.refuse(f"layered elements of type {kind}")
+            known = (2, 8, 17) if kind in LAYERED else (5, 6) if kind < min(LAYERED) else ()  # technology, output
+            for key in (
+                key for key, value in self.options.get(number, {}).items() if value != "0" and key not in known
+            ):
+                self.mesh.skipped.refuse(f"elements of type {kind} with option {key}")
             if death:
                 self.mesh.skipped.refuse("EBLOCK, elements that are dead")
             shape, members = _solid(nodes[:count])
@@ -122,7 +126,7 @@ class ArchiveMesh:
             raise Refusal(f"{block} of '{self.path}' has {self.i - start} lines of {count}: write the file again")
         self.i += 1
 
-    def _row(self, block: str, columns: list[tuple[int, int, type]]) -> list[float]:
+    def _row(self, block: str, columns: list[tuple[int, int, Callable[[str], float]]]) -> list[float]:
         """The numbers of the next line, integers and reals as its columns are; blanks are zeros."""
         if self.i == len(self.lines):
             self._end(block)
@@ -131,7 +135,7 @@ class ArchiveMesh:
         try:
             if not line or len(line) > columns[-1][1]:
                 raise ValueError("empty or too long")
-            return [number(line[start:end].strip() or 0) for start, end, number in columns if start < len(line)]
+            return [number(line[start:end].strip() or "0") for start, end, number in columns if start < len(line)]
         except ValueError:
             raise Refusal(
                 f"'{self.path}' has a broken {block} at line {self.i}: '{line.strip()[:40]}': write it again"
@@ -140,12 +144,12 @@ class ArchiveMesh:
     def _end(self, block: str) -> NoReturn:
         raise Refusal(f"'{self.path}' ends inside a block ({block}): the file is cut off")
 
-    def _columns(self) -> list[tuple[int, int, type]]:
+    def _columns(self) -> list[tuple[int, int, Callable[[str], float]]]:
         """Start, end and kind of the columns of a block, from a line such as (1i7,2i9,6e21.13e3)."""
         line = "".join(self.lines[self.i : self.i + 1]).strip()
         fields = re.findall(r"(\d*)([a-zA-Z])(\d+)(?:\.\d+(?:[eE]\d+)?)?(?=[,)])", line)
-        kinds = {"i": int, "a": int, "e": float, "g": float, "f": float}
-        columns: list[tuple[int, int, type]] = []
+        kinds: dict[str, Callable[[str], float]] = {"i": int, "a": int, "e": finite, "g": finite, "f": finite}
+        columns: list[tuple[int, int, Callable[[str], float]]] = []
         for repeat, kind, width in fields:
             for _ in range(int(repeat or 1) if kind.lower() in kinds else 0):
                 start = columns[-1][1] if columns else 0

@@ -33,7 +33,7 @@ class CardTable:
 
     read : carried over; silent : of no effect, not worth a word; harmless : why -> cards that are named and not used
     fields : card -> names of its fields in their order; (NAME) is of no effect here; one without a name, or beyond the
-        last, is refused where it is neither blank nor 0; "..." are more of the last kind
+        last, is refused where it is neither blank nor 0; "..." are more of the last kind; ";" ends a line's
     parameters : card -> names of its parameters"""
 
     read: str
@@ -78,9 +78,10 @@ class SkippedCards:
         """What would change stiffness, mass, support or load."""
         self.refused.setdefault(name, f"{name}")
 
-    def check_fields(self, name: str, values: Sequence[str]) -> None:
-        """Refuse a card with a value in a field that its reader does not know."""
-        known = [field_name.strip() for field_name in self.table.fields.get(name, "...").split(",")]
+    def check_fields(self, name: str, values: Sequence[str], line: int = 0) -> None:
+        """Refuse a card with a value in a field that its reader does not know. line : of the card's data, from 0"""
+        lines = self.table.fields.get(name, "...").split(";")
+        known = [field_name.strip() for field_name in lines[min(line, len(lines) - 1)].split(",")]
         for k, value in enumerate(values if known[-1] != "..." else values[: len(known) - 1]):
             if value.strip("0.") and (k >= len(known) or not known[k]):
                 self.refuse(f"{self.mark}{name}, {value} in field {k + 1}")

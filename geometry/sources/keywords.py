@@ -48,6 +48,12 @@ class Card:
         except ValueError:
             raise Refusal(f"{self.where} expects a whole number, got '{text}': correct the line") from None
 
+    def axis(self, text: str) -> int:
+        """An axis 0..5, counted from 1 in the deck."""
+        if text not in tuple("123456"):
+            raise Refusal(f"{self.where} names the direction '{text}': count from 1 to 6")
+        return int(text) - 1
+
     @property
     def where(self) -> str:
         """Place of the card in a sentence."""

@@ -66,7 +66,8 @@ def read(path: Path) -> RawMesh:
 class _Bulk(ReferenceCards):
     """Reads the cards of a file one after the other.
 
-    weight : PARAM WTMASS"""
+    chosen : kind of set -> numbers that the case control selects, None where there is no case control
+    grids, systems, springs, scales : cards that others refer to, by their number; weight : PARAM WTMASS"""
 
     sets: dict[int, list[int]] = field(default_factory=dict)
     properties: dict[int, tuple[int, int]] = field(default_factory=dict)
@@ -100,8 +101,8 @@ class _Bulk(ReferenceCards):
     def psolid(self, card: str, fields: list[str]) -> None:
         """Material of solids, and its system."""
         self.properties[to_int(fields[0], card)] = (to_int(fields[1], card), to_int(fields[2] or "0", card))
-        if fields[6] not in ("", "SMECH"):
-            self.mesh.skipped.refuse(f"PSOLID, {fields[6]}")
+        for value in {fields[3], fields[6]} - {"", "0", "BUBBLE", "SMECH"}:
+            self.mesh.skipped.refuse(f"PSOLID, {value}")
 
     def material(self, card: str, fields: list[str]) -> None:
         """An isotropic, orthotropic or anisotropic material."""
@@ -113,6 +114,8 @@ class _Bulk(ReferenceCards):
             young, shear, poisson = constants[:3]
             if poisson is None and young and shear:
                 poisson = young / (2 * shear) - 1
+            elif young and shear and poisson and not 0.99 < 2 * shear * (1 + poisson) / young < 1.01:
+                self.mesh.skipped.refuse("MAT1, a G that is not E / 2 (1 + NU)")
             elif young is None and poisson is not None and shear:
                 young = 2 * shear * (1 + poisson)
             item, after = replace(item, young=young, poisson=poisson), constants[3:5]
@@ -127,7 +130,7 @@ class _Bulk(ReferenceCards):
 
     def set1(self, card: str, fields: list[str]) -> None:
         """A set of grid points or elements."""
-        self.sets[to_int(fields[0], card)] = expand_list(fields[1:])
+        self.sets[to_int(fields[0], card)] = expand_list(fields[1:], self.grids)
 
     def param(self, card: str, fields: list[str]) -> None:
         """A parameter: WTMASS scales masses; any other one is skipped and recorded by name."""
@@ -143,7 +146,7 @@ class _Bulk(ReferenceCards):
         if not self.selected("SPC", fields[0]):
             return
         if card == "SPC1":
-            for label in expand_list(fields[2:]):
+            for label in expand_list(fields[2:], self.grids):
                 self.mesh.hold(label, to_axes(fields[1], card))
         for point, axes, value in (fields[1:4], fields[4:7]) if card == "SPC" else ():
             if point:
@@ -171,7 +174,8 @@ class _Bulk(ReferenceCards):
             if any(fields[k] for k in range(7, len(fields)) if k % 8 in (0, 7)):
                 self.mesh.skipped.refuse("MPC with terms in the first or last field of a line")
             terms = [fields[start : start + 3] for start in starts if fields[start]]
-            self.mesh.equations.append([(to_int(g, card), to_axes(c, card)[0], to_float(a, card)) for g, c, a in terms])
+            mine = [(to_int(g, card), to_axes(c, card, True)[0], to_float(a, card)) for g, c, a in terms]
+            self.mesh.equations.append(mine)
 
     def spring(self, card: str, fields: list[str]) -> None:
         """A spring between two displacements, or to the ground."""
@@ -179,12 +183,14 @@ class _Bulk(ReferenceCards):
             raise Refusal(f"CELAS1 {fields[0]} of '{self.path}' names a PELAS that it has not: add it")
         value = to_float(fields[1], card) if card == "CELAS2" else self.springs[to_int(fields[1] or fields[0], card)]
         ends = zip(fields[2:6:2], fields[3:6:2], (1.0, -1.0), strict=True)
-        terms = [(to_int(g, card), to_axes(c, card)[0], f) for g, c, f in ends if g not in ("", "0")]
+        terms = [(to_int(g, card), to_axes(c, card, True)[0], f) for g, c, f in ends if g not in ("", "0")]
         self.mesh.springs.append((terms, value))
 
     def rbe2(self, card: str, fields: list[str]) -> None:
         """Grid points that move as a rigid body with one of them."""
-        members = expand_list([text for text in fields[3:] if "." not in text])
+        members = expand_list([text for text in fields[3:] if "." not in text], self.grids)
+        if any(to_float(text, card) for text in fields[3:] if "." in text):
+            self.mesh.skipped.refuse("RBE2, ALPHA")
         self.mesh.couple(card, "kinematic", to_int(fields[1], card), members, to_axes(fields[2], card))
 
     def rbe3(self, card: str, fields: list[str]) -> None:
@@ -218,7 +224,10 @@ class _Bulk(ReferenceCards):
         """The mesh with everything that the cards give."""
         mesh = self.mesh
         labels = {label for elements in mesh.solids.values() for label, _ in elements}
-        for number, members in {**dict(case_sets(control)), **self.sets}.items():
+        for kind, number in ((kind, number) for kind, chosen in (self.chosen or {}).items() for number in chosen):
+            if (kind, number) not in self.defined and (kind != "LOAD" or not mesh.skipped.refused):
+                raise Refusal(f"'{self.path}' selects {kind} {number}, a set that it has not: correct the number")
+        for number, members in {**dict(case_sets(control, {*mesh.points, *labels})), **self.sets}.items():
             if all(label in mesh.points for label in members):
                 mesh.node_sets[f"SET {number}"] = members
             elif labels.issuperset(members):
@@ -270,7 +279,7 @@ SPACES |= {name: name[:3] for name in ("MAT1", "MAT9", "MAT11")} | {
     f"CORD{k}{of}": "CORD" for k in "12" for of in "RCS"
 }
 FIELDS = fields_of("""GRID: ID, CP, X1, X2, X3, CD, PS; GRDSET: , CP, , , , CD, PS;
-    CTETRA CPYRAM CPENTA CHEXA: EID, PID, G1, ...; PSOLID: PID, MID, CORDM, (IN), (STRESS), (ISOP), FCTN;
+    CTETRA CPYRAM CPENTA CHEXA: EID, PID, G1, ...; PSOLID: PID, MID, CORDM, IN, (STRESS), (ISOP), FCTN;
     MAT1: MID, E, G, NU, RHO, A, (TREF), (GE), (ST), (SC), (SS), (MCSID); MAT9: MID, G11, ...;
     MAT11: MID, E1, E2, E3, NU12, NU13, NU23, G12, G13, G23, RHO, A1, A2, A3, (TREF), (GE); PARAM: N, V1;
     SPC: SID, G1, C1, D1, G2, C2, D2; SPC1: SID, C, G1, ...; FORCE MOMENT: SID, G, CID, F, N1, N2, N3;

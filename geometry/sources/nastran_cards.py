@@ -5,7 +5,7 @@ These are grid points, systems, stiffnesses of springs and sums of sets."""
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Iterator
+from collections.abc import Collection, Iterable, Iterator
 from dataclasses import dataclass, field, replace
 from itertools import takewhile
 from pathlib import Path
@@ -62,7 +62,7 @@ def cards_of(lines: Iterable[str]) -> Iterator[tuple[str, list[str]]]:
     cards: list[BulkCard] = []
     loose: dict[str, BulkCard] = {}
     previous: BulkCard | None = None
-    items = [_line(line) for line in takewhile(lambda line: line[:7].upper() != "ENDDATA", lines)]
+    items = [_line(line) for line in takewhile(lambda line: line.lstrip()[:7].upper() != "ENDDATA", lines)]
     markers = {item.marker for item in items}
     for item in items:
         if item.name[:1] not in ("", "+", "*"):
@@ -113,32 +113,34 @@ def selected_sets(control: str) -> dict[str, set[int]]:
     return numbers_of
 
 
-def case_sets(control: str) -> Iterator[tuple[int, list[int]]]:
+def case_sets(control: str, labels: Collection[int]) -> Iterator[tuple[int, list[int]]]:
     """SET n = 1, 5 THRU 9 of the case control, with lines that a comma continues."""
     for number, items in re.findall(r"(?im)^\s*SET\s+(\d+)\s*=\s*((?:[^\n]*,[ \t]*\n)*[^\n]*)", control):
         words = items.replace(",", " ").split()
         if all(word.isdigit() or word.upper() == "THRU" for word in words):
-            yield int(number), expand_list(words)
+            yield int(number), expand_list(words, labels)
 
 
-def expand_list(words: list[str]) -> list[int]:
+def expand_list(words: list[str], labels: Collection[int]) -> list[int]:
+    """Numbers of a list with THRU; of a range that is longer than the file has labels, those that it has."""
     numbers: list[int] = []
-    words = [word for word in words if word]
-    i = 0
-    while i < len(words):
-        if words[i].upper() == "THRU":
-            numbers += range(numbers[-1] + 1, to_int(words[i + 1], "a list with THRU") + 1)
-            i += 1
+    items = iter(word for word in words if word)
+    for word in items:
+        if word.upper() == "THRU":
+            first, last = (numbers or [0])[-1], to_int(next(items, ""), "a list with THRU")
+            if not 0 < first <= last:
+                raise Refusal(f"a list has {first} THRU {last}: count up from 1")
+            is_wide = last - first > len(labels)
+            numbers += sorted(n for n in labels if first < n <= last) if is_wide else range(first + 1, last + 1)
         else:
-            numbers.append(to_int(words[i], "a list"))
-        i += 1
+            numbers.append(to_int(word, "a list of numbers and THRU"))
     return numbers
 
 
-def to_axes(text: str, card: str) -> tuple[int, ...]:
-    """Axes 0..5 of digits 1 to 6."""
-    if set(text) - set("123456"):
-        raise Refusal(f"{card} names the directions '{text}': write digits from 1 to 6")
+def to_axes(text: str, card: str, is_one: bool = False) -> tuple[int, ...]:
+    """Axes 0..5 of digits 1 to 6. is_one : whether the card takes one"""
+    if set(text) - set("123456") or (is_one and len(text) != 1):
+        raise Refusal(f"{card} names the directions '{text}': write {'one digit' if is_one else 'digits'} from 1 to 6")
     return tuple(int(digit) - 1 for digit in text)
 
 
@@ -152,7 +154,7 @@ def to_int(text: str, card: str) -> int:
 def to_float(text: str, card: str) -> float:
     """A number as Nastran writes it, such as 1.-3, 0 for none."""
     try:
-        return float(_EXPONENT.sub(r"e\1", text.upper().replace("D", "E")) or 0.0)
+        return text_file.finite(_EXPONENT.sub(r"e\1", text.upper().replace("D", "E")))
     except ValueError:
         raise Refusal(f"{card} expects a number, got '{text}': correct the card") from None
 
@@ -162,8 +164,9 @@ class ReferenceCards:
     """Cards by their number, before the others are read.
 
     chosen : kind of set -> numbers that the case control selects, None where there is no case control
-    grids, springs : cards; systems : of coordinate systems; built : those that are built; scales : of load sets
-    unselected : a clause for each set that is not in force; common : fields of GRDSET"""
+    systems : cards of coordinate systems; built : those that are built; scales : of load sets
+    unselected : a clause for each set that is not in force; defined : kind and number of each set
+    common : fields of GRDSET"""
 
     path: Path
     mesh: LabelledMesh
@@ -174,6 +177,7 @@ class ReferenceCards:
     springs: dict[int, float] = field(default_factory=dict)
     scales: dict[int, float] = field(default_factory=dict)
     unselected: set[str] = field(default_factory=set)
+    defined: set[tuple[str, int]] = field(default_factory=set)
     common: list[str] = field(default_factory=lambda: [""] * 8)
 
     def system(self, text: str) -> System | None:
@@ -202,6 +206,7 @@ class ReferenceCards:
 
     def selected(self, kind: str, text: str) -> bool:
         """Whether a set of supports, equations or loads is in force."""
+        self.defined.add((kind, to_int(text, kind)))
         if self.chosen is None or to_int(text, kind) in self.chosen[kind]:
             return True
         self.unselected.add(f"set {kind} {text}, which the case control does not select")
@@ -225,12 +230,14 @@ class ReferenceCards:
     def add(self, card: str, fields: list[str]) -> None:
         """A sum of sets."""
         number = to_int(fields[0], card)
+        self.defined.add((card[:3] if card != "LOAD" else card, number))
         if card == "LOAD":
             if self.chosen is None or number in self.chosen[card]:
                 total_scale, parts = to_float(fields[1], card), [text for text in fields[2:] if text]
                 for scale, of in zip(parts[::2], parts[1::2], strict=False):
-                    self.scales[to_int(of, card)] = total_scale * to_float(scale, card)
+                    more = total_scale * to_float(scale, card)
+                    self.scales[to_int(of, card)] = self.scales.get(to_int(of, card), 0.0) + more
                     if self.chosen is not None:
                         self.chosen[card].add(to_int(of, card))
         elif self.chosen is not None and number in self.chosen[card[:3]]:
-            self.chosen[card[:3]].update(expand_list(fields[1:]))
+            self.chosen[card[:3]].update(to_int(text, card) for text in fields[1:] if text)

@@ -42,7 +42,7 @@ class NoPeak(Refusal):
 class PeakRefinement:
     """The search from one frequency [rad/s].
 
-    solved_x : x by frequency, of the start and of points that are solved already, no fold among them
+    known : x by frequency, of the start and of points that are solved already, no fold among them
     stride : first step [rad/s], by default the condition's; limits : of the frequency [rad/s]"""
 
     def __init__(

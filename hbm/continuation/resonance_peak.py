@@ -119,7 +119,7 @@ class AtPeak:
     def solve_between(
         self, balance: HarmonicBalance, omega: float, solved_x: dict[float, np.ndarray], low: float, high: float
     ) -> OperatingPoint:
-        """Refine a maximum of a curve between two frequencies [rad/s]; solved_x : by frequency, of no fold."""
+        """Refine a maximum of a curve between two frequencies [rad/s]; known : x by frequency, of no fold."""
         return PeakRefinement(self, balance, omega, solved_x, 0.25 * (high - low), (low, high)).run()
 
     @single

@@ -41,7 +41,8 @@ def cell(value: Any) -> Any:
     """A value of a table; a text that a spreadsheet would take for a formula begins with an apostrophe, which it hides.
 
     Source  OWASP, CSV injection"""
-    return f"'{value}" if isinstance(value, str) and _FORMULA.match(value) else value
+    text = printable(value) if isinstance(value, str) else ""
+    return f"'{text}" if _FORMULA.match(text) else text or value
 
 
 def set_aside(path: Path) -> Path | None:

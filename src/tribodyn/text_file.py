@@ -4,6 +4,7 @@ Every reader of a text takes it from here, so that a byte order mark, UTF-16 or 
 """
 
 import codecs
+import math
 import re
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, field
@@ -29,20 +30,28 @@ def encoding_of(head: bytes) -> str:
 
 
 def text_of(path: Path) -> str:
-    """The text of a file, with line ends as one character each; what is no UTF is read as Windows-1252."""
+    """Text of a file with line ends of one character, control characters replaced; no UTF is read as Windows-1252."""
     content = path.read_bytes()
     encoding = encoding_of(content[:4096])
     try:
         text = content.decode(encoding)
     except UnicodeDecodeError:
         text = content.decode("cp1252" if encoding == "utf-8" else encoding, errors="replace")
-    return text.replace("\r\n", "\n").replace("\r", "\n").rstrip("\x1a")  # the end of a file for DOS
+    text = text.replace("\r\n", "\n").replace("\r", "\n")
+    return CONTROL.sub("\ufffd", text.rstrip("\x1a"))  # the end of a file for DOS
+
+
+def finite(word: str) -> float:
+    """A word as a number, 0 where it is empty. Raises ValueError for infinity, "nan" and what is no number."""
+    if not math.isfinite(number := float(word or 0)):
+        raise ValueError(f"no finite number: '{word}'")
+    return number
 
 
 def numbers_of(words: Iterable[str]) -> list[float] | None:
     """Words as numbers, None where one of them is none."""
     try:
-        return [float(word) for word in words]
+        return [finite(word or "none") for word in words]
     except ValueError:
         return None
 
@@ -77,7 +86,6 @@ def lines_of(
 
     comment : what a line begins with that is passed over, as empty lines then are; "" to have all lines
     continues : whether a line goes on in the next; included_name : name of the file that a line includes, or ""
-    Control characters are replaced, so that no name of a file reaches a terminal with them.
     Raises  Refusal: an included file that is not there, that includes itself, or more of them than any deck has"""
     return _Inclusions(path.resolve().parent, comment, continues, included_name).lines(path)
 
@@ -98,7 +106,7 @@ class _Inclusions:
         """Lines of a file. within : files that include it"""
         within = (*within, path.resolve())
         line, pending = Line("", path, 0), ""
-        for number, text in enumerate(CONTROL.sub("\ufffd", text_of(path)).split("\n"), 1):
+        for number, text in enumerate(text_of(path).split("\n"), 1):
             if self.comment and (not (stripped := text.strip()) or stripped.startswith(self.comment)):
                 continue
             line = Line(text, path, number) if not pending else line._replace(text=pending + text.strip())

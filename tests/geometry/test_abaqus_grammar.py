@@ -1,5 +1,6 @@
 """What stands on the cards of an Abaqus deck changes the structure as it should, or is refused by its name."""
 
+import re
 from pathlib import Path
 
 import numpy as np
@@ -21,6 +22,7 @@ FEET = BASE + "*BOUNDARY\nFOOT, 1, 3\n"
 HALF = [f"*NSET, NSET={name}\n" + "".join(f"{n}\n" for n in TIP[k::2]) for k, name in enumerate("AB")]
 RIGID = "*NODE, NSET=R\n900, 130., 10., 5.\n*NODE, NSET=T\n901, 130., 10., 5.\n"
 STIFF = RIGID + "*RIGID BODY, NSET=TIP, REF NODE=900\n"
+COUPLED = "*COUPLING, REF NODE=900, SURFACE=U\n*KINEMATIC\n"
 FACES = "*SURFACE, NAME=F\n2, S4\n*SURFACE, NAME=G\nTIP\n"
 SPUN = STIFF + "*ELEMENT, TYPE=MASS, ELSET=M\n90, 900\n*MASS, ELSET=M\n1e-3\n"
 PAIRS = list(zip(TIP[:4], FOOT[:4], strict=True))
@@ -62,18 +64,9 @@ EQUAL = {
         FEET + SPUN + "*BOUNDARY\n900, 1, 6\n"),
     "both kinds": (BASE + SPUN + "*NSET, NSET=X\n900, FOOT\n*BOUNDARY\nX, 1, 3\n",
         FEET + SPUN + "*BOUNDARY\n900, 1, 3\n"),
-    "union": (
-        FEET + RIGID + FACES + "*SURFACE, NAME=U, COMBINE=UNION\nF\n*COUPLING, REF NODE=900, SURFACE=U\n*KINEMATIC\n",
-        FEET + STIFF,
-    ),
-    "union before its members": (
-        FEET
-        + RIGID
-        + "*SURFACE, NAME=U, COMBINE=UNION\nf, F\n"
-        + FACES
-        + "*COUPLING, REF NODE=900, SURFACE=U\n*KINEMATIC\n",
-        FEET + STIFF,
-    ),
+    "union": (FEET + RIGID + FACES + "*SURFACE, NAME=U, COMBINE=UNION\nF\n" + COUPLED, FEET + STIFF),
+    "union before its members": (FEET + RIGID + "*SURFACE, NAME=U, COMBINE=UNION\nf, F\n" + FACES + COUPLED,
+        FEET + STIFF),
     "supports of a part": (part("*BOUNDARY\nFOOT, 1, 3\n"), FEET),
     "supports of a turned part": (part("*BOUNDARY\nFOOT, ENCASTRE\n", TURNED), FEET),
     "equations of a part": (part("*BOUNDARY\nFOOT, 1, 3\n" + SINGLE), FEET + SINGLE),
@@ -142,6 +135,15 @@ BROKEN = {
     "unequal sets": (paired("", "1, 2, 3", "4, 5"), "pairs sets of 2 and 3 nodes"),
     "a set after a node": ("*EQUATION\n2\n1, 1, 1., FOOT, 1, -1.\n", "pairs sets of 1 and"),
     "data elsewhere": ("*BOUNDARY, INPUT=more.txt\n", r"\*BOUNDARY at line \d+ .* has its data in another file"),
+    "a term too many": ("*EQUATION\n2\n1, 1, 1., 2, 1, -1., 3, 1, 1.\n", "has 9 fields for its 2 terms"),
+    "an axis 0": ("*EQUATION\n2\n1, 0, 1., 2, 0, -1.\n", "names the direction '0'"),
+    "an axis 7": ("*ELEMENT, TYPE=SPRING1, ELSET=K\n90, 1\n*SPRING, ELSET=K\n7\n5.\n", "names the direction '7'"),
+    "a spring of no length": ("*ELEMENT, TYPE=SPRINGA, ELSET=K\n90, 1, 1\n*SPRING, ELSET=K\n5.\n", "at one place"),
+    "a node again": ("*NODE\n1, 9., 9., 9.\n", "has node 1 again"),
+    "an element again": ("*ELEMENT, TYPE=MASS\n1, 1\n", "has element 1 again"),
+    "too many nodes": ("*ELEMENT, TYPE=C3D4\n90, 1, 2, 3, 4, 5\n", "with more nodes than C3D4 has"),
+    "a constant again": ("*MATERIAL, NAME=T\n*DENSITY\n1.\n*DENSITY\n2.\n", "gives another value of material 'T'"),
+    "a set with a lost node": ("*NSET, NSET=E\n1, 999\n*BOUNDARY\nE, 1\n", "names 'E' with node 999"),
     "infinite": ("*NODE\n990, 1e400, 0., 0.\n", "expects a number, got '1e400'"),
     "the same element twice": ("*ELEMENT, TYPE=C3D8\n77, " + ", ".join(map(str, CELLS[0][:8])) + "\n",
         "such as 1 and 77"),
@@ -156,6 +158,11 @@ def test_what_cannot_be_read_is_refused_in_one_sentence(case: str, tmp_path: Pat
 
 
 NAMED = {
+    "*MPC": "*MPC\nBEAM, 1, 2\n",
+    "*TRANSFORM": "*TRANSFORM, NSET=FOOT, TYPE=R\n1., 1., 0., -1., 1., 0.\n",
+    "S4": "*ELEMENT, TYPE=S4, ELSET=SHELL\n9100, 1, 2, 3, 4\n",
+    "*DLOAD, GRAV": "*DLOAD\nALL, GRAV, 9810., 0., 0., -1.\n",
+    "*OF ANOTHER AGE": "*OF ANOTHER AGE\n1\n",
     "*EQUATION, REMOVE": "*EQUATION, REMOVE\n",
     "*TIE, CYCLICSYMMETRY": FACES + "*TIE, CYCLIC SYMMETRY, NAME=T\nF, F\n",
     "*RIGID BODY, ELSET": RIGID + "*RIGID BODY, ELSET=ALL, REF NODE=900\n",
@@ -171,6 +178,15 @@ NAMED = {
     "*NSET, 5": "*NSET, NSET=E, 5\n1\n",
     "*SURFACE, COMBINE=DIFFERENCE": FACES + "*SURFACE, NAME=D, COMBINE=DIFFERENCE\nF, G\n",
     "supports with a displacement": "*BOUNDARY\nTIP, 1, 1, .05\n",
+    "*BOUNDARY, direction 11": "*BOUNDARY\nTIP, 11, 11, 5.\n",
+    "*KINEMATIC, direction 7": RIGID + FACES + "*COUPLING, REF NODE=900, SURFACE=F\n*KINEMATIC\n1, 6\n7, 9\n",
+    "*COUPLING, without *KINEMATIC or *DISTRIBUTING": RIGID + FACES + "*COUPLING, REF NODE=900, SURFACE=F\n",
+    "elements of type MASS without *MASS": "*ELEMENT, TYPE=MASS, ELSET=M\n90, 1\n",
+    "*MASS, of elements of type C3D20": "*MASS, ELSET=ALL\n1.\n",
+    "*MASS, 2. in field 1": "*ELEMENT, TYPE=MASS, ELSET=M\n90, 1\n*MASS, ELSET=M\n1.\n2.\n",
+    "*SPRING, of SPRING2 with other numbers than its directions and a stiffness": "*ELEMENT, TYPE=SPRING2, ELSET=K\n"
+    "90, 1, 2\n*SPRING, ELSET=K\n1\n5.\n",
+    "*CONTACT PAIR, F in field 3": FACES + "*CONTACT PAIR\nF, G, F\n",
 }
 
 
@@ -178,10 +194,13 @@ NAMED = {
 def test_what_is_not_declared_is_refused_by_name_and_ignored_on_request(name: str, tmp_path: Path) -> None:
     (tmp_path / "own.inp").write_text(FEET + NAMED[name])
     assert list(foreign_file.read(tmp_path / "own.inp", "mm").refused) == [name]
-    with pytest.raises(ValueError, match="not carried over"):
+    with pytest.raises(ValueError, match=f'not carried over.*ignore = ."{re.escape(name)}"'):
         decks.structure("d", DeckTable(file="own.inp", unit=1e-3), {}, tmp_path)
     if "SURFACE" not in name:
-        decks.structure("d", DeckTable(file="own.inp", unit=1e-3, ignore=(name,)), {}, tmp_path)
+        notes = decks.structure("d", DeckTable(file="own.inp", unit=1e-3, ignore=(name,)), {}, tmp_path).notes
+        assert any("by ignore" in note for note in notes)
+    with pytest.raises(ValueError, match="NOWHERE"):
+        decks.structure("d", DeckTable(file="own.inp", unit=1e-3, ignore=(name, "NOWHERE")), {}, tmp_path)
 
 
 @pytest.mark.parametrize(("cards", "forces"), [

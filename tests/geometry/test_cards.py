@@ -19,6 +19,7 @@ END = len(cut(SMALL, straight)[0])  # a node beyond those of the solids comes af
 STEEL = "*MATERIAL, NAME=S\n*ELASTIC\n200000., .3\n*DENSITY\n7.8e-9\n*SOLID SECTION, ELSET=ALL, MATERIAL=S\n"
 TYPES = "ETBLOCK,1,1\n(2i9,19a9)\n        1      186        0        0        1\n       -1\n"
 POINT = "*NODE\n999, 150., 0., 0.\n"
+LUMP = POINT + "*ELEMENT, TYPE=MASS, ELSET=M\n9, 999\n*MASS, ELSET=M\n1e-3\n"
 PART = (
     "*PART, NAME=P\n"
     + bricks(SMALL, straight)
@@ -41,11 +42,11 @@ READ = {
         "ELSET": ("inp", "*ELSET, ELSET=SOME\n1\n"),
         "SURFACE": ("inp", "*SURFACE, NAME=END\n2, S4\n"),
         "INCLUDE": ("inp", "*INCLUDE, INPUT=more.inp\n"),
-        "SYSTEM": ("inp", "*SYSTEM\n1., 0., 0.\n*NODE\n1, 0., 0., 0.\n"),
+        "SYSTEM": ("inp", "*SYSTEM\n1., 0., 0.\n" + LUMP),
         "ORIENTATION": ("inp", "*ORIENTATION, NAME=OWN\n1., 1., 0., -1., 1., 0.\n"),
         "DISTRIBUTION": ("inp", "*ORIENTATION, NAME=OWN\nD\n*DISTRIBUTION, NAME=D\n, 1., 1., 0., -1., 1., 0.\n"),
         "EXPANSION": ("inp", "*EXPANSION\n1e-5\n"),
-        "MASS": ("inp", POINT + "*ELEMENT, TYPE=MASS, ELSET=M\n9, 999\n*MASS, ELSET=M\n1e-3\n"),
+        "MASS": ("inp", LUMP),
         "SPRING": ("inp", "*ELEMENT, TYPE=SPRING1, ELSET=K\n9, 1\n*SPRING, ELSET=K\n1\n500.\n"),
         "TIE": ("inp", FACES + "*TIE, NAME=T\nEND, START\n"),
         "EQUATION": ("inp", "*EQUATION\n2\n1, 1, 1., 2, 1, -1.\n"),
@@ -176,15 +177,8 @@ def test_a_card_that_is_read_matters(ending: str, card: str) -> None:
     smaller = without(text, card, ending)
     assert smaller != text
     *_, refused = full = outcome_of(text, ending)
-    assert not refused or card in (
-        "ET",
-        "ETBLOCK",
-        "KEYOPT",
-        "KEYOP",
-        "KEYO",
-        "CSYS",
-        "LOCAL",
-    )  # what these choose is refused
+    choices = ("ET", "ETBLOCK", "KEYOPT", "KEYOP", "KEYO", "CSYS", "LOCAL")  # what these choose is refused
+    assert not refused or card in choices
     with suppress(ValueError):  # of a deck that lacks what it cannot do without
         assert card in FRAMES or outcome_of(smaller, ending) != full
 
@@ -208,7 +202,9 @@ FORCE = "FORCE,1,2,,5.,1.,0.,0.\n"
 # what is written in two ways: added to the base of a format, or in place of another text
 ALIKE = {
     "a long free line": ("bdf", "SPC1,1,123,1,2,3,4,5,6,7,8,9,10\n", "SPC1,1,123,1,THRU,10\n"),
-    "after ENDDATA": ("bdf", "ENDDATA\nSPC1,1,123,1\nNOTES OF AN OLD RUN\n", ""),
+    "a range wider than the mesh": ("bdf", f"SPC1,1,123,1,THRU,{10**12}\n", f"SPC1,1,123,1,THRU,{END}\n"),
+    "a load twice in a sum": ("bdf", f"LOAD,9,1.,1.,1,2.,1\n{FORCE}", f"LOAD,9,1.,3.,1\n{FORCE}"),
+    "after ENDDATA": ("bdf", " ENDDATA\nSPC1,1,123,1\nNOTES OF AN OLD RUN\n", ""),
     "a marker": ("bdf", f"SPC1,1,123,1,2,3,4,5,6,+A\n{FORCE}+A,7,8\n", f"SPC1,1,123,1,THRU,8\n{FORCE}"),
     "a marker before": ("bdf", f"{FORCE}+A,7,8\nSPC1,1,123,1,2,3,4,5,6,+A\n", f"{FORCE}SPC1,1,123,1,THRU,8\n"),
     "a range": ("cdb", "D,1,UX,0,,5,2,UY\n", "D,1,UX\nD,3,UX\nD,5,UX\nD,1,UY\nD,3,UY\nD,5,UY\n"),
@@ -234,6 +230,12 @@ def test_ways_to_write_a_card_are_alike(case: str) -> None:
     ("bdf", "MAT1,1,1000.,,.3\n", "has a second MAT1 1"),
     ("bdf", "SPC1,1,123,1\n+B,2\n+C,3\n+D,4\nSPC1,1,123,1,2,3,4,5,6,+Q\n+R,1\n", "no card ends with the marker"),
     ("cdb", "N,1,5.,0.,0.\n", "two nodes have the number 1"),
+    ("cdb", "F,1,FX,nan\n", "no finite number: 'nan'"),
+    ("bdf", "SPC1,1,123,9,THRU,2\n", "a list has 9 THRU 2"),
+    ("bdf", "SPC1,1,123,THRU,2\n", "a list has 0 THRU 2"),
+    ("bdf", "CELAS2,8,500.,1,12\n", "names the directions '12'"),
+    ("bdf", "MPC,1,1,12,1.,2,12,-1.\n", "names the directions '12'"),
+    ("bdf", "CELAS2,8,inf,1,1\n", "expects a number, got 'inf'"),
 ])  # fmt: skip
 def test_what_contradicts_itself_is_refused(ending: str, extra: str, words: str) -> None:
     with pytest.raises(ValueError, match=words):
@@ -243,6 +245,9 @@ def test_what_contradicts_itself_is_refused(ending: str, extra: str, words: str)
 @pytest.mark.parametrize(("ending", "extra", "refused"), [
     ("bdf", "GRID,999,,1.,0.,0.,,,7\n", "GRID, 7 in field 8"),
     ("bdf", "CONM2,5,1,7,1.-3,,,,,2.\n", "CONM2, inertia along a system"),
+    ("bdf", "PSOLID,2,1,0,TWO,,FULL\n", "PSOLID, TWO"),
+    ("bdf", "MAT1,2,200000.,50000.,.3\n", "MAT1, a G that is not E / 2 (1 + NU)"),
+    ("bdf", "GRID,999,,150.,0.,0.\nRBE2,5,999,123456,1,2,3,4,5,1.2-5\n", "RBE2, ALPHA"),
     ("cdb", "D,1,UX,0,3.\n", "D, 3., an imaginary part"),
     ("cdb", "F,1,FX,2.,,2,1,UY\n", "F, UY in field 7"),
     ("cdb", "LOCAL,11,1,0,0,0,0,0,0,2.\n", "LOCAL, an elliptic system"),

@@ -105,6 +105,8 @@ def test_a_set_of_supports_that_the_case_control_does_not_select_holds_nothing(t
     np.testing.assert_allclose(
         frequencies(text, 2, tmp_path, ending), frequencies(first, 2, tmp_path, ending), rtol=1e-9
     )  # fmt: skip
+    with pytest.raises(ValueError, match="selects SPC 7, a set that it has not"):
+        frequencies(text.replace("SPC = 1", "SPC = 7"), 2, tmp_path, ending)
 
 
 @pytest.mark.slow

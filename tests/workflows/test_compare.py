@@ -249,6 +249,9 @@ SWEEP = "frequency_Hz,displacement_um,force_N,phase_deg\n" + "".join(f"{f},1,1,0
     ("# position = 1 m, 0 m, 0 m\n" + SWEEP, "position: measured"),
     (SWEEP.replace("400,1,", "400,0,"), "numbers above 0 in every row"),
     (SWEEP.replace("400,1,1,0\n", "400,1,1\n"), "rows of as many values"),
+    (SWEEP.replace("400,1,1,0\n", "400,1,0,0\n"), "column force: expected numbers other than 0"),
+    (SWEEP.replace("400,1,1,0\n", "400,,1,0\n"), "column displacement_um has '', which is no number"),
+    (SWEEP.replace(",", ";").replace("400;1;", "400;1,x;"), "column displacement_um has '1.x'"),
 ])  # fmt: skip
 def test_what_does_not_fit_is_one_sentence_and_exit_code_2(text: str, words: str, tmp_path: Path, capsys) -> None:
     path = tmp_path / "sweep.csv"

@@ -16,7 +16,7 @@ from tribodyn.geometry.sources import foreign_process
 from tribodyn.hbm.time.ring_down import from_decay
 from tribodyn.hbm.time.stepper import IntegrationFailed
 from tribodyn.refusal import Refusal
-from tribodyn.text_file import text_of
+from tribodyn.text_file import numbers_of, text_of
 from tribodyn.workflows.scene.fields import parsed_direction, unknown_key
 from tribodyn.workflows.scene.units import LARGEST, SMALLEST, to_si
 from tribodyn.workflows.studies.measured import universal_file
@@ -78,8 +78,11 @@ def csv_columns(path: Path, known: Collection[str]) -> tuple[dict[str, str], dic
             if fact[1] not in known:
                 raise Refusal(unknown_key(fact[1], [*known]))
             facts[fact[1]] = fact[2].strip('"')
+    table = [line for line in lines if line.strip() and not line.startswith("#")]
+    separator = max(",;\t", key=(table or [""])[0].count)
+    point = "," if separator == "," else "."  # beside another separator a comma is that of a decimal number
     try:
-        rows = list(csv.reader(line for line in lines if line.strip() and not line.startswith("#")))
+        rows = list(csv.reader((line.replace(",", point) for line in table), delimiter=separator))
     except csv.Error as error:
         raise Refusal(f"no table of values between commas ({error}): write it again") from None
     if len(rows) < 2 or any(len(row) != len(rows[0]) for row in rows):
@@ -176,6 +179,8 @@ def _measurement(raw: Mapping[str, Any], facts: Mapping[str, str], source: str) 
     positive = [run.frequency for run in runs] if response is None else [run.frequency * run.amplitude for run in runs]
     if not all(len(k) and np.isfinite(k).all() and (k > 0).all() for k in positive):
         raise Refusal("frequency and response must be numbers above 0 in every row")
+    if "force" in columns and kind == "response" and not (force[kept] > 0).all():
+        raise Refusal("column force: expected numbers other than 0 in every row")
     unused = () if kept.all() else (f"{n - kept.sum()} lines at 0 Hz, where nothing vibrates",)
     directions = _direction(facts, "direction"), _direction(facts, "force_direction")
     return Measurement(
@@ -260,8 +265,9 @@ def column_numbers(name: str, column: Any, may_be_complex: bool = False) -> np.n
     try:
         values = np.atleast_1d(np.asarray(column))
         values = values if may_be_complex and np.iscomplexobj(values) else values.astype(float)
-    except (ValueError, TypeError) as error:
-        raise Refusal(f"column {name}: {error}") from None
+    except (ValueError, TypeError):
+        wrong = next((text for text in np.ravel(column).tolist() if numbers_of([f"{text}"]) is None), column)
+        raise Refusal(f"column {name} has '{wrong}', which is no number: correct it") from None
     if values.ndim > 1:
         raise Refusal(f"column {name} has the shape {values.shape}: give one column")
     size = np.abs(values)
