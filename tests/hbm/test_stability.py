@@ -3,9 +3,8 @@
 import numpy as np
 import pytest
 
-from tests.helpers.floquet import multipliers
 from tests.helpers.reduced import HarmonicModel
-from tests.helpers.stability_in_time import stability_in_time
+from tests.helpers.stability_in_time import multipliers, stability_in_time
 from tests.helpers.three_pairs import FLIPS_AT, three_pairs
 from tests.helpers.verification_models import interface, oscillator
 from tribodyn.fem.system import SecondOrderSystem

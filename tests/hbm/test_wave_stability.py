@@ -4,8 +4,7 @@ import numpy as np
 import pytest
 
 from tests.helpers import tiny_wheel as tiny
-from tests.helpers.floquet import multipliers
-from tests.helpers.stability_in_time import stability_in_time
+from tests.helpers.stability_in_time import multipliers, stability_in_time
 from tribodyn.hbm import newton
 from tribodyn.hbm.contact.contact_law import SEPARATES, SLIPS
 from tribodyn.hbm.stability import exponents
