@@ -90,7 +90,7 @@ class SceneBackbone(StudyResult):
         rows = {
             "reference_hz": self.mode.reference_omega / (2 * np.pi),
             **{name: values.tolist() for name, values in self.columns.items()},
-            "rows": _rows(self.columns),
+            "rows": rows_of(self.columns),
             "end": str(self.mode.end),
         }
         if self.published is not None:
@@ -209,7 +209,7 @@ def differences_from(mode: Backbone, published: PublishedBackbone) -> dict[str, 
         "shift": theirs[0] / theirs[0][:1] - 1,
         "our_shift": ours[0] / ours[0][:1] - 1,
     }
-    return {"source": published.source, "rows": _rows(columns)}
+    return {"source": published.source, "rows": rows_of(columns)}
 
 
 def _at(interpolated: Backbone, modal_amplitude: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -220,7 +220,7 @@ def _at(interpolated: Backbone, modal_amplitude: np.ndarray) -> tuple[np.ndarray
     return tuple(PchipInterpolator(np.log(a), v)(np.log(modal_amplitude)) for v in values)
 
 
-def _rows(columns: Mapping[str, np.ndarray]) -> list[dict[str, float]]:
+def rows_of(columns: Mapping[str, np.ndarray]) -> list[dict[str, float]]:
     """Columns (n,) as rows for machines."""
     return [dict(zip(columns, map(float, row), strict=True)) for row in np.array([*columns.values()]).T]
 

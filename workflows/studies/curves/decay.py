@@ -20,11 +20,12 @@ from tribodyn.workflows.pictures.figures import axes_of, length_unit, log_axis
 from tribodyn.workflows.pictures.matplotlib_names import Figure
 from tribodyn.workflows.pictures.theme import BLUE, ORANGE
 from tribodyn.workflows.result.number_format import named_lines
+from tribodyn.workflows.result.summary import plain
 from tribodyn.workflows.run import modelling, settings
 from tribodyn.workflows.run.progress import Progress, Report, reporter
 from tribodyn.workflows.scene.fields import Length, quantity
 from tribodyn.workflows.scene.scene_file import Overrides, SceneFile, Source, read_scene
-from tribodyn.workflows.studies.curves.backbones import AmplitudeRange, follow_mode
+from tribodyn.workflows.studies.curves.backbones import AmplitudeRange, follow_mode, rows_of
 from tribodyn.workflows.studies.files import write_files
 from tribodyn.workflows.studies.study_result import StudyResult
 
@@ -67,11 +68,8 @@ class Decay(StudyResult):
             "backbone_decrement": self.at(self.expected),
             "backbone_damping": self.at(self.mode.damping),
         }
-        rows = np.array([*columns.values()]).T
         return {
-            "rows": [
-                {n: float(v) if np.isfinite(v) else None for n, v in zip(columns, row, strict=True)} for row in rows
-            ],
+            "rows": plain(rows_of(columns)),
             "largest_frequency_difference": _largest(d.omega, self.at(self.mode.omega)),
             "largest_decrement_difference": _largest(d.damping, self.at(self.expected)),
             "largest_damping_difference": _largest(d.damping, self.at(self.mode.damping)),

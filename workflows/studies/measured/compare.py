@@ -13,6 +13,7 @@ from tribodyn.workflows.pictures.figures import axes_of, length_unit, named
 from tribodyn.workflows.pictures.matplotlib_names import Figure
 from tribodyn.workflows.pictures.theme import BLUE, GREY, ORANGE
 from tribodyn.workflows.result.number_format import named_lines
+from tribodyn.workflows.result.summary import plain
 from tribodyn.workflows.run import modelling
 from tribodyn.workflows.run.progress import Report, reporter
 from tribodyn.workflows.scene.scene_file import AnyPath, Overrides, SceneFile, Source, read_scene
@@ -118,9 +119,9 @@ class MeasurementComparison(StudyResult):
         return peaks_of_runs
 
     def record(self) -> dict[str, Any]:
-        rows = [{n: None if v != v else v for n, v in row.items()} for row in self.rows()]
         return {
-            "scene": self.name, "measurement": self.measured.source, "kind": self.measured.kind, "rows": rows,
+            "scene": self.name, "measurement": self.measured.source, "kind": self.measured.kind,
+            "rows": plain(self.rows()),
             "peaks": self.peaks(), "largest": self.largest(), "outside": self._outside(),
             "unused": [*self.measured.unused],
         }  # fmt: skip

@@ -13,6 +13,7 @@ from tribodyn.workflows.pictures.figures import axes_of, length_unit
 from tribodyn.workflows.pictures.matplotlib_names import Figure
 from tribodyn.workflows.pictures.theme import BLUE, CYCLE, GREY, ORANGE
 from tribodyn.workflows.result.number_format import measured, named_lines
+from tribodyn.workflows.result.summary import plain
 from tribodyn.workflows.scene.fields import Frequency, Number, quantity
 from tribodyn.workflows.scene.scene_file import AnyPath
 from tribodyn.workflows.studies.files import write_files
@@ -53,19 +54,15 @@ class MeasuredLoops(StudyResult):
         """The run with the largest sliding range, which the keys of the scene are taken from."""
         return max(self.runs.values(), key=lambda run: run.numbers["sliding"])
 
-    def record(self) -> dict[str, Any]:
-
-        def known(value: float) -> float | None:
-            return value if np.isfinite(value) else None
-
+    def record(self) -> Any:
         runs = {}
         for name, run in self.runs.items():
-            ends = {key: dict(zip(("value", "low", "high"), map(known, (i.value, *i.ends)), strict=True))
+            ends = {key: dict(zip(("value", "low", "high"), (i.value, *i.ends), strict=True))
                     for key, i in run.intervals.items()}  # fmt: skip
-            rules = {rule: known(value) for rule, value in run.rules.items()}
             cycles = {"frequency_hz": run.loop.cycles.frequency, "cycles": run.loop.cycles.count}
-            runs[name] = {**cycles, "running_in": run.running_in, "slides": slides(run.numbers), **ends, "rules": rules}
-        return {"measurement": self.source, "runs": runs}
+            states = {"running_in": run.running_in, "slides": slides(run.numbers)}
+            runs[name] = {**cycles, **states, **ends, "rules": dict(run.rules)}
+        return plain({"measurement": self.source, "runs": runs})
 
     def lines(self) -> list[str]:
         lines = []
