@@ -84,15 +84,9 @@ class HarmonicBalance:
 
     @classmethod
     def of(
-        cls,
-        model: ReducedModel,
-        joints: Joint | Sequence[Joint],
-        basis: HarmonicBasis,
-        excitation: Excitation,
-        omega_max: float,
-        memory: np.ndarray | None = None,
-        previous: HarmonicBalance | None = None,
-    ) -> HarmonicBalance:
+        cls, model: ReducedModel, joints: Joint | Sequence[Joint], basis: HarmonicBasis, excitation: Excitation,
+        omega_max: float, memory: np.ndarray | None = None, previous: HarmonicBalance | None = None,
+    ) -> HarmonicBalance:  # fmt: skip
         """The balance of a model with one or several joints; their springs become the stuck reference springs.
 
         Springs of few contacts that are far stiffer than the body get a softer reference: the body would be lost.
@@ -206,7 +200,7 @@ class HarmonicBalance:
 
     def evaluate(self, omega: float, x: np.ndarray, jacobian: bool = True) -> State:
         """The balance at x (n_pair, n_component, n_coeff)."""
-        cycle = self.contact.cycle(x, self.basis, self.memory, jacobian)
+        cycle = self.contact.cycle(x, self.basis, self.memory, jacobian, omega)
         flat = x.reshape(-1, x.shape[2])
         g = self.reference_stiffness[:, None] * flat - cycle.force.reshape(flat.shape)
         point = self.at(omega)
@@ -219,7 +213,16 @@ class HarmonicBalance:
 
     def frequency_slope(self, state: State) -> tuple[np.ndarray, np.ndarray]:
         """d / d omega at fixed x of R (n_contact, n_coeff) and of the outputs (n_output, n_coeff)."""
-        displacement, outputs = self.at(state.omega).slope(state.g, self.load_factor)
+        point = self.at(state.omega)
+        displacement, outputs = point.slope(state.g, self.load_factor)
+        if self.contact.needs_velocity:
+            step = 1e-6 * state.omega
+            above, below = (
+                self.contact.cycle(state.x, self.basis, self.memory, jacobian=False, omega=omega).force
+                for omega in (state.omega + step, state.omega - step)
+            )
+            departure = ((below - above) / (2 * step)).reshape(state.g.shape)
+            displacement, outputs = displacement + point.apply(departure), outputs + point.outputs(departure)
         return -displacement, outputs
 
     def gap_response(self, state: State, opening: np.ndarray) -> np.ndarray:
@@ -268,4 +271,4 @@ class HarmonicBalance:
 
     def history(self, state: State) -> tuple[np.ndarray, np.ndarray]:
         """Displacement [m] and contact force [N] over one period, both (n_pair, n_component, n_samples)."""
-        return self.contact.history(state.x, self.basis, self.memory)
+        return self.contact.history(state.x, self.basis, self.memory, state.omega)

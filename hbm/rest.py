@@ -63,6 +63,6 @@ def tangents(balance: HarmonicBalance, x: np.ndarray) -> dict[str, np.ndarray]:
         return {}
     still = np.zeros((*x.shape, basis.n_coeff))
     still[:, :, 0] = x
-    jac = contact.cycle(still, basis, balance.memory).slope
+    jac = contact.cycle(still, basis, balance.memory, omega=balance.omega_max).slope
     each = np.diagonal(jac, axis1=1, axis2=2).reshape(still.shape)[:, :, basis.harmonics.index(1)]
     return {joint.name: np.maximum(each[np.ix_(joint.rows, contact.columns(joint))], 0.0) for joint in soft_joints}

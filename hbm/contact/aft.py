@@ -1,5 +1,6 @@
 """Alternating frequency/time: march any contact law to its periodic cycle, with its derivatives."""
 
+from dataclasses import replace
 from types import ModuleType
 
 import numba
@@ -22,18 +23,14 @@ LEAST_CONTRACTION = 1e-10  # per cycle, of a memory that does not depend on its 
 
 
 def cycle(
-    law: ModuleType,
-    x: np.ndarray,
-    parameters: ContactParameters,
-    basis: HarmonicBasis,
-    memory: np.ndarray | None = None,
-    jacobian: bool = True,
-) -> ContactCycle:
+    law: ModuleType, x: np.ndarray, parameters: ContactParameters, basis: HarmonicBasis,
+    memory: np.ndarray | None = None, jacobian: bool = True, omega: float = 0.0,
+) -> ContactCycle:  # fmt: skip
     """Periodic contact cycle of all pairs: by a cycle that the law offers, else by its steps.
 
     x : (n_pair, n_component, n_coeff) relative displacement [m]
-    memory : (n_pair, n_state) memory at the start of the load path, zeros if None
-    Raises  Refusal where the basis has located transitions and the law has samples only"""
+    memory : (n_pair, n_state) memory at the start of the load path, zeros if None; omega : for laws with velocities
+    Raises  Refusal where the basis has located transitions and the law has samples only, or omega is not known"""
     contact_law.require_order(law, parameters)
     if memory is None:
         memory = np.zeros((parameters.n_pair, law.n_state(parameters.components)))
@@ -46,17 +43,36 @@ def cycle(
         return event_cycle.cycle(law, *arguments) if closed_form is None else closed_form(*arguments)
     if hasattr(law, "sampled_cycle"):
         return law.sampled_cycle(x, parameters, memory, basis, jacobian)
-    return march(law, x, parameters, memory, basis, jacobian)
+    moving, timed = with_velocity(law, x, parameters, basis, omega)
+    marched = march(law, moving, timed, memory, basis, jacobian)
+    if moving is x:
+        return marched
+    (n_pair, n, n_coeff), slope = x.shape, marched.jacobian
+    if slope is not None:  # by x, and by the velocity omega d x / d (omega t)
+        slope = slope.reshape(n_pair, 2 * n, n_coeff, 2 * n, n_coeff)[:, :n]
+        slope = slope[:, :, :, :n] + omega * slope[:, :, :, n:] @ basis.rate.T
+        slope = slope.reshape(n_pair, n * n_coeff, n * n_coeff)
+    return ContactCycle(marched.force[:, :n], slope, marched.status)
+
+
+def with_velocity(
+    law: ModuleType, x: np.ndarray, parameters: ContactParameters, basis: HarmonicBasis, omega: float
+) -> tuple[np.ndarray, ContactParameters]:
+    """Displacements with the velocities behind them, and parameters that end with the time between two samples.
+
+    Both as they are for a law that needs neither"""
+    if not contact_law.needs_velocity(law):
+        return x, parameters
+    if omega == 0.0:
+        raise Refusal(f"contact law '{contact_law.name_of(law)}' needs velocities: it has no nonlinear modes")
+    times = np.full((parameters.n_pair, 1), 2 * np.pi / (omega * basis.n_samples))
+    return np.concatenate([x, omega * x @ basis.rate], axis=1), replace(parameters, tabulation=times)
 
 
 def march(
-    law: ModuleType,
-    x: np.ndarray,
-    parameters: ContactParameters,
-    memory: np.ndarray,
-    basis: HarmonicBasis,
+    law: ModuleType, x: np.ndarray, parameters: ContactParameters, memory: np.ndarray, basis: HarmonicBasis,
     jacobian: bool = True,
-) -> ContactCycle:
+) -> ContactCycle:  # fmt: skip
     """March a contact law to its periodic cycle and transform the force to harmonics.
 
     x : (n_pair, n_component, n_coeff) relative displacement [m]
@@ -70,12 +86,9 @@ def march(
 
 
 def history(
-    law: ModuleType,
-    x: np.ndarray,
-    parameters: ContactParameters,
-    basis: HarmonicBasis,
-    memory: np.ndarray | None = None,
-) -> tuple[np.ndarray, np.ndarray]:
+    law: ModuleType, x: np.ndarray, parameters: ContactParameters, basis: HarmonicBasis,
+    memory: np.ndarray | None = None, omega: float = 0.0,
+) -> tuple[np.ndarray, np.ndarray]:  # fmt: skip
     """Periodic displacement and force over one period, for loops and checks.
 
     For a basis with located transitions the cycle is marched on at least PLOT_SAMPLES samples; every n-th is returned.
@@ -84,11 +97,12 @@ def history(
         memory = np.zeros((parameters.n_pair, law.n_state(parameters.components)))
     stride = 1 if basis.transitions == "sampled" else -(-PLOT_SAMPLES // basis.n_samples)
     fine = HarmonicBasis(basis.harmonics, stride * basis.n_samples)
-    samples = fine.to_time(x)
+    moving, parameters = with_velocity(law, x, parameters, fine, omega)
+    samples, n = fine.to_time(moving), x.shape[1]
     force = _plain_march(law, samples, parameters.packed(), memory)
     if force is None:
         force = _periodic(law, samples, parameters, memory, fine.synthesis[:, :0], fine.analysis)[0]
-    return samples[..., ::stride], force[..., ::stride]
+    return samples[:, :n, ::stride], force[:, :n, ::stride]
 
 
 def _plain_march(law: ModuleType, samples: np.ndarray, p: np.ndarray, memory: np.ndarray) -> np.ndarray | None:
@@ -107,13 +121,9 @@ def _plain_march(law: ModuleType, samples: np.ndarray, p: np.ndarray, memory: np
 
 
 def _periodic(
-    law: ModuleType,
-    samples: np.ndarray,
-    parameters: ContactParameters,
-    memory: np.ndarray,
-    phi: np.ndarray,
+    law: ModuleType, samples: np.ndarray, parameters: ContactParameters, memory: np.ndarray, phi: np.ndarray,
     weight: np.ndarray,
-) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:  # fmt: skip
     """Force at the samples, Jacobian of its coefficients and status of the periodic cycle."""
     n_pair, n_comp, _ = samples.shape
     force, status = np.zeros(samples.shape), np.zeros(n_pair, np.int64)

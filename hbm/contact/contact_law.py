@@ -20,6 +20,8 @@ and any of these options:
 - `sampled_cycle(x, parameters, memory, basis, jacobian)` : the same periodic cycle as the steps make, faster
 - `event_based_cycle(x, parameters, memory, basis, jacobian)` : the cycle with its transitions located between samples,
   faster than `hbm.contact.event_cycle` finds them from the steps
+- `VELOCITY = True` : behind the displacements x holds the velocities [m/s], dfx and dsx their columns, p ends with the
+  time since the sample before [s]; f has as many places as x, those of velocities stay zero. It is taken at the samples
 - `SAMPLES_ONLY = True` : there is no event-based cycle, as the law is smooth or its step integrates along the path
 - `SIMPLER_LAW = "jenkins"` : a law with the same components and numbers, whose solution is a first guess for Newton"""
 
@@ -153,7 +155,12 @@ def load(name: str) -> ModuleType:
 
 def is_event_based(law: ModuleType) -> bool:
     """Whether the transitions of a law are located between samples, by itself or from its steps."""
-    return hasattr(law, "event_based_cycle") or not getattr(law, "SAMPLES_ONLY", False)
+    return hasattr(law, "event_based_cycle") or not (getattr(law, "SAMPLES_ONLY", False) or needs_velocity(law))
+
+
+def needs_velocity(law: ModuleType) -> bool:
+    """Whether the step of a law takes velocities, too."""
+    return getattr(law, "VELOCITY", False)
 
 
 def name_of(law: ModuleType) -> str:

@@ -30,13 +30,9 @@ class CycleNotPeriodic(SolverFailure):
 
 
 def cycle(
-    law: ModuleType,
-    x: np.ndarray,
-    parameters: ContactParameters,
-    memory: np.ndarray,
-    basis: HarmonicBasis,
+    law: ModuleType, x: np.ndarray, parameters: ContactParameters, memory: np.ndarray, basis: HarmonicBasis,
     jacobian: bool = True,
-) -> ContactCycle:
+) -> ContactCycle:  # fmt: skip
     """The periodic cycle of all pairs; arguments as `hbm.contact.aft.march`. Raises CycleNotPeriodic."""
     (n_pair, n_comp, n_coeff), n_state = x.shape, memory.shape[1]
     hs, skip = np.asarray(basis.dynamic, np.int64), 0 if basis.has_static else 1

@@ -202,6 +202,11 @@ class JointSet:
         return any(joint.has_friction for joint in self.joints)
 
     @property
+    def needs_velocity(self) -> bool:
+        """Whether a law takes velocities."""
+        return any(contact_law.needs_velocity(joint.module) for joint in self.joints)
+
+    @property
     def tangential(self) -> list[int]:
         """Positions of the tangential components, the ones in which friction works."""
         return [i for i, c in enumerate(self.components) if c != "n"]
@@ -242,14 +247,17 @@ class JointSet:
     def _with(self, parameters: Callable[[Joint], ContactParameters]) -> JointSet:
         return replace(self, joints=tuple(replace(joint, parameters=parameters(joint)) for joint in self.joints))
 
-    def cycle(self, x: np.ndarray, basis: HarmonicBasis, memory: np.ndarray, jacobian: bool = True) -> ContactCycle:
+    def cycle(
+        self, x: np.ndarray, basis: HarmonicBasis, memory: np.ndarray, jacobian: bool = True, omega: float = 0.0
+    ) -> ContactCycle:
         """Periodic contact cycle of all pairs, each by the law of its joint.
 
         x : (n_pair, n_component, n_coeff) [m]; memory : (n_pair, n_state) at the start of the load path
+        omega : [rad/s], for laws that need velocities
         Raises  Refusal where the basis has located transitions and a law does not locate them"""
         single = self._single
         if single is not None:
-            return aft.cycle(single.module, x, single.parameters, basis, memory, jacobian)
+            return aft.cycle(single.module, x, single.parameters, basis, memory, jacobian, omega)
         n_pair, n_comp, n_coeff = x.shape
         width = n_comp * n_coeff
         force, status = np.zeros_like(x), np.zeros(n_pair, np.int64)
@@ -258,32 +266,34 @@ class JointSet:
             rows, columns = joint.rows, self.columns(joint)
             joint_x = np.ascontiguousarray(x[np.ix_(rows, columns)])
             start = np.ascontiguousarray(memory[rows, : joint.n_state])
-            part = aft.cycle(joint.module, joint_x, joint.parameters, basis, start, jacobian)
+            part = aft.cycle(joint.module, joint_x, joint.parameters, basis, start, jacobian, omega)
             force[np.ix_(rows, columns)], status[rows] = part.force, part.status
             if slope is not None:
                 at = (columns[:, None] * n_coeff + np.arange(n_coeff)).ravel()
                 slope[np.ix_(rows, at, at)] = part.jacobian
         return ContactCycle(force, slope, status)
 
-    def history(self, x: np.ndarray, basis: HarmonicBasis, memory: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    def history(
+        self, x: np.ndarray, basis: HarmonicBasis, memory: np.ndarray, omega: float
+    ) -> tuple[np.ndarray, np.ndarray]:
         """Periodic displacement [m] and force [N] over one period, both (n_pair, n_component, n_samples).
 
         Arguments as for `cycle`; see `hbm.contact.aft.history`"""
         single = self._single
         if single is not None:
-            return aft.history(single.module, x, single.parameters, basis, memory)
+            return aft.history(single.module, x, single.parameters, basis, memory, omega)
         force = np.zeros((*x.shape[:2], basis.n_samples))
         for joint in self.joints:
-            force[np.ix_(joint.rows, self.columns(joint))] = self.history_of(joint, x, basis, memory)[1]
+            force[np.ix_(joint.rows, self.columns(joint))] = self.history_of(joint, x, basis, memory, omega)[1]
         return basis.to_time(x), force
 
     def history_of(
-        self, joint: Joint, x: np.ndarray, basis: HarmonicBasis, memory: np.ndarray
+        self, joint: Joint, x: np.ndarray, basis: HarmonicBasis, memory: np.ndarray, omega: float
     ) -> tuple[np.ndarray, np.ndarray]:
         """Periodic displacement and force of the pairs of one joint, over the components of its law."""
         joint_x = np.ascontiguousarray(x[np.ix_(joint.rows, self.columns(joint))])
         start = np.ascontiguousarray(memory[joint.rows, : joint.n_state])
-        return aft.history(joint.module, joint_x, joint.parameters, basis, start)
+        return aft.history(joint.module, joint_x, joint.parameters, basis, start, omega)
 
     def repeat(self, copies: int) -> tuple[Joint, ...]:
         """The joints of several copies of the contact in a row, such as all sectors of a wheel have."""

@@ -114,7 +114,7 @@ class ParameterEffects:
         """(n_pair, n_component, n_coeff) difference of the forces of another contact at the same x [N]."""
         if contact is self.balance.contact and memory is self.balance.memory:
             return np.zeros_like(self.state.x)
-        cycle = contact.cycle(self.state.x, self.balance.basis, memory, jacobian=False)
+        cycle = contact.cycle(self.state.x, self.balance.basis, memory, jacobian=False, omega=self.state.omega)
         return np.asarray(cycle.force - self.state.cycle.force)
 
     def _linear_change(self, inputs: BalanceInputs) -> tuple[np.ndarray, np.ndarray]:

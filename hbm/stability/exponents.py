@@ -100,6 +100,8 @@ def stability(balance: HarmonicBalance, state: State, n_modes: int | None = None
     balance = balance.standing(state.omega)
     model = balance.model
     model.require_masters("stability")
+    if balance.contact.needs_velocity:
+        raise Refusal("Hill's method serves no contact law that needs velocities: verify judges stability in time")
     if model.is_wave:
         return _of_wave(balance, state, n_modes, top)
     if not model.has_motion_in_time:

@@ -123,7 +123,9 @@ def _by_differences(stepper: TimeStepper, state: State, options: Options) -> tup
     moves = np.ones(len(base.start), bool)
     moves[2 * stepper.n_dynamic :] = False  # what holds a mean displacement stays as it is
     n_memory = balance.memory.size
-    moves[2 * stepper.n_dynamic :][:n_memory] = np.repeat(period.record.bits != STICKS, balance.memory.shape[1])
+    moves[2 * stepper.n_dynamic :][:n_memory] = np.repeat(
+        (period.record.bits != STICKS) | stepper.is_timed, balance.memory.shape[1]
+    )
 
     def product(v: np.ndarray) -> np.ndarray:
         disturbed = plain.step(plain.vector.unpack(base.start + size * v, period.end))

@@ -108,7 +108,7 @@ class Follower:
         """Go on with what `stored_state` returned, of a balance that differs in its gaps alone."""
         self._regular, self._passing = bool(stored[1]), bool(stored[2])
         stepper = self._stepper = TimeStepper(balance, float(stored[0]), self._march_options())
-        pairs, memory = balance.contact.stiffness.shape, balance.memory.shape
+        pairs, memory = balance.contact.stiffness.shape, stepper.balance.memory.shape
         hold = 0 if stepper.hold is None else len(stepper.hold.dofs)
         sizes = [3, 2 * len(stepper.modes[0]), *2 * (pairs[0] * pairs[1],), memory[0] * memory[1], pairs[0], hold]
         _, z, x, f, s, bits, p = np.split(stored, np.cumsum(sizes)[:-1])

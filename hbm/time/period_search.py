@@ -133,7 +133,7 @@ class PeriodSearch:
         if self.periods >= self.options.max_periods or self.periods - self._best_at >= patience:
             raise GivenUp
         end, record, _, speed = self.stepper.period(motion, self.with_slopes)
-        if self.options.accelerate and not self.options.rigid:
+        if self.options.accelerate and not self.options.rigid and not self.stepper.is_timed:
             end = end._replace(memory=self.stepper.memory_of(record.x))
         if self.stepper.hold is not None:
             end = end._replace(hold=self.stepper.hold.after(record))

@@ -17,7 +17,7 @@ from tribodyn.hbm.balance import HarmonicBalance, State
 from tribodyn.hbm.contact import compiled_law
 from tribodyn.hbm.contact.contact_law import STICKS
 from tribodyn.hbm.harmonics import HarmonicBasis
-from tribodyn.hbm.time import compile_ahead, coupled_pairs, rigid_contact, time_step
+from tribodyn.hbm.time import compile_ahead, coupled_pairs, law_in_time, rigid_contact, time_step
 from tribodyn.hbm.time.hold import Hold
 from tribodyn.hbm.time.time_step import Moving, Record
 from tribodyn.refusal import Refusal, SolverFailure
@@ -84,11 +84,13 @@ class TimeStepper:
                 "time integration needs one system for all harmonics: a cyclic part alone has no equation of motion in "
                 "time"
             )
-        self.balance, self.omega, self.options = balance, omega, options
+        self.h = 2 * np.pi / omega / options.steps
+        self.balance = balance = law_in_time.timed(balance, self.h)
+        self.is_timed = isinstance(balance.contact.joints[0], law_in_time.TimedJoint)
+        self.omega, self.options = omega, options
         system = model.system
         self.modes = modes or _free_modes(system)
         lam, phi = self.modes
-        self.h = 2 * np.pi / omega / options.steps
         m = max(1, int(np.sum(lam < (RESOLVED / self.h) ** 2)))
         self.n_pair, self.c = balance.contact.stiffness.shape
         self.stops = options.rigid and rigid_contact.stops_masses(m, len(lam), balance.contact)
@@ -153,7 +155,7 @@ class TimeStepper:
     def worn(self, balance: HarmonicBalance) -> TimeStepper:
         """The same for a balance that differs in its gaps alone."""
         other = copy(self)
-        other.balance = balance
+        other.balance = balance = law_in_time.timed(balance, self.h)
         parameters = balance.contact.merge("time integration").parameters
         other.contact = self.contact._replace(p=parameters.packed(), gap=parameters.gap)
         return other
@@ -215,6 +217,9 @@ class TimeStepper:
         closed = np.zeros(self.n_pair, bool)
         if self.stops:  # the force of a mass that is stopped is one of a step, not of an instant
             return Moving(z.copy(), x_free.reshape(x.shape) + self.series * f, f, s, np.full(len(x), STICKS), hold)
+        if self.is_timed:  # another step of the law would be one in time
+            x = (x_free - self.static @ f.ravel()).reshape(x.shape)
+            return Moving(z.copy(), x, f, s, np.full(len(x), STICKS), np.array(hold))
         scale, space = float(np.abs(x).max()), coupled_pairs.Space.of(self.n_pair, self.c, s.shape[1])
         coupled_pairs.displace(contact.A, f, space.y)
         rounds, _ = coupled_pairs.solve_contact(self.law, contact, x_free, x.copy(), closed, s, x, f, scale, space)

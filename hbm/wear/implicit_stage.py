@@ -141,7 +141,7 @@ class WearingBalance:
 
     def evaluate(self, omegas: tuple[float, ...], x: np.ndarray) -> WornState:
         """The balance at x, every pair at the depth that its own work wears."""
-        depth, cycle = self._wear_along(x)
+        depth, cycle = self._wear_along(omegas, x)
         flat = x.reshape(-1, x.shape[2])
         g = self.reference_stiffness[:, None] * flat - cycle.force.reshape(flat.shape)
         residual = flat - self.x_lin(omegas) - self.at(omegas).apply(g)
@@ -160,10 +160,10 @@ class WearingBalance:
         change, _, _ = self.linearise(state).solve(-self.at(state.omegas).join(spread), 1e-4)
         return change.reshape(state.x.shape)
 
-    def _wear_along(self, x: np.ndarray) -> tuple[np.ndarray, ContactCycle]:
+    def _wear_along(self, omegas: tuple[float, ...], x: np.ndarray) -> tuple[np.ndarray, ContactCycle]:
         """Depth that goes with x, and the contact cycles at it with their derivative along x and depth."""
         parts = self.parts(x)
-        depth, samples = self._solve_depth(parts)
+        depth, samples = self._solve_depth(omegas, parts)
         first = self.balances[0]
         n_coeff = x.shape[2]
         width = self._n_component * n_coeff
@@ -186,11 +186,11 @@ class WearingBalance:
             status |= sample.cycle.status
         return depth, ContactCycle(force, jacobian, status)
 
-    def _solve_depth(self, parts: Sequence[np.ndarray]) -> tuple[np.ndarray, list[_Sample]]:
+    def _solve_depth(self, omegas: tuple[float, ...], parts: Sequence[np.ndarray]) -> tuple[np.ndarray, list[_Sample]]:
         """The depth of every pair by Newton's method inside a bracket, and the cycles at it."""
         size = np.maximum.reduce([np.abs(p).max(axis=(1, 2)) for p in parts])
         depth, low, high = self._guess.copy(), self.base.copy(), np.full_like(self.base, np.inf)
-        full = self._sample(parts, depth, np.arange(len(depth)))
+        full = self._sample(omegas, parts, depth, np.arange(len(depth)))
         todo = np.arange(len(depth))
         samples = full
         for _ in range(MAX_ITERATIONS):
@@ -210,18 +210,20 @@ class WearingBalance:
                 break
             todo = todo[~done]
             depth[todo] = trial[~done]
-            samples = self._sample(parts, depth, todo)
+            samples = self._sample(omegas, parts, depth, todo)
             full = [sample.updated(todo, part) for sample, part in zip(full, samples, strict=True)]
         self._guess = depth
         return depth, full
 
-    def _sample(self, parts: Sequence[np.ndarray], depth: np.ndarray, pairs: np.ndarray) -> list[_Sample]:
+    def _sample(
+        self, omegas: tuple[float, ...], parts: Sequence[np.ndarray], depth: np.ndarray, pairs: np.ndarray
+    ) -> list[_Sample]:
         """Contact cycles of some pairs at a depth, duty by duty, with their share of the work and its derivative."""
         samples = []
-        for share, balance, part in zip(self.shares, self.balances, parts, strict=True):
+        for share, balance, omega, part in zip(self.shares, self.balances, omegas, parts, strict=True):
             x = part[pairs]
             contact = balance.contact.subset(pairs).with_gap(balance.contact.gap[pairs] + depth[pairs])
-            cycle = contact.cycle(x, balance.basis, balance.memory[pairs])
+            cycle = contact.cycle(x, balance.basis, balance.memory[pairs], omega=omega)
             t = contact.tangential
             if self._normal is None or not balance.basis.has_static:
                 column = np.zeros((len(pairs), cycle.slope.shape[1]))

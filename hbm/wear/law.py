@@ -99,7 +99,7 @@ class Exposure:
         if motion is not None:
             at = np.ix_(self.joint.rows, balance.contact.columns(self.joint))
             return motion.x[at], motion.force[at]
-        return balance.contact.history_of(self.joint, self.state.x, balance.basis, balance.memory)
+        return balance.contact.history_of(self.joint, self.state.x, balance.basis, balance.memory, self.state.omega)
 
     @cached_property
     def normal_force_times_slip(self) -> np.ndarray:

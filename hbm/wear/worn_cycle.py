@@ -85,7 +85,9 @@ class WornCycle:
     ) -> np.ndarray:
         """(n_pair,) share of the duty in the depth per cycle [m], with something changed."""
         changed, x = balance or self.balance, self.solved.x if x is None else x
-        state = replace(self.solved, x=x, cycle=changed.contact.cycle(x, changed.basis, changed.memory, jacobian=False))
+        omega = self.solved.omega
+        cycle = changed.contact.cycle(x, changed.basis, changed.memory, jacobian=False, omega=omega)
+        state = replace(self.solved, x=x, cycle=cycle)
         depth, cycles = self.state.depth + deeper, self.state.cycles + later
         return self.duty.share * wear_of(problem or self.tangent.problem, changed, state, depth, cycles)[0]
 

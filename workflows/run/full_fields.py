@@ -80,7 +80,7 @@ def hysteresis_loops(balance: HarmonicBalance, states: States, numbers: np.ndarr
     displacement, force = [], []
     for s in states:
         contact = balance.contact.with_gap(balance.contact.gap + s.depth)
-        x, f = contact.history(s.displacement.reshape(shape), balance.basis, balance.memory)
+        x, f = contact.history(s.displacement.reshape(shape), balance.basis, balance.memory, s.omega)
         displacement.append(x)
         force.append(f)
     return Loops(np.asarray(numbers), np.stack(displacement), np.stack(force))
