@@ -62,7 +62,12 @@ def ends(tmp_path_factory: pytest.TempPathFactory) -> list[tuple[int, str, str]]
     td.build("beam", {"geometry.n_patch": 3})  # a part that an environment with the mesher has left in the cache
     lines = [f"run own.toml {SHORT} --out out", f"run own.toml {SHORT} --out out2 --no-pictures --quiet"]
     lines += ["run beam --set geometry.n_patch=3"]
-    lines += ["draw out", "report out", "study converge own.toml", "export out --to csv"]
+    lines += [
+        "draw out",
+        "report out",
+        "curve backbone own.toml --from 1um --to 2um --points 3 --quiet",
+        "export out --to csv",
+    ]
     commands = [line.split() for line in lines]
     head = f"ABSENT, POSIX, COMMANDS = {[*EXTRA, *MODULES - {'posix'}]!r}, {POSIX!r}, {commands!r}\n"
     done = subprocess.run([sys.executable, "-c", head + SOLVER_ALONE], cwd=folder, capture_output=True, text=True)
@@ -77,9 +82,15 @@ def test_matrices_are_solved_by_the_solver_alone(ends: list[tuple[int, str, str]
 
 
 def test_a_missing_package_is_one_sentence(ends: list[tuple[int, str, str]]) -> None:
-    for (code, _, error), package in zip(ends[2:6], ("gmsh", "matplotlib", "matplotlib", "matplotlib"), strict=True):
+    for (code, _, error), package in zip(ends[2:5], ("gmsh", "matplotlib", "matplotlib"), strict=True):
         cure = f'install it with pip install "tribodyn[{EXTRA[package]}]"'
         assert (code, error) == (2, f"tribodyn: this needs the package {package}: {cure}.\n")
+
+
+def test_a_curve_leaves_its_table_without_pictures(ends: list[tuple[int, str, str]]) -> None:
+    code, out, error = ends[5]
+    assert (code, out.split()[-1]) == (0, "results/own/backbone.csv")
+    assert error.startswith("no pictures, tables alone: this needs the package matplotlib: install it with pip")
 
 
 def _posix_words(tree: ast.AST) -> list[str]:

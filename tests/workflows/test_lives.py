@@ -170,7 +170,7 @@ def test_runs_are_added_for_a_rare_life_and_taken_again(tmp_path: Path, monkeypa
     assert 16 < result.runs <= 48
     count = len(requested)
     assert count == result.runs
-    repeated = td.studies.lives(tables, tmp_path, rare=1e-4, resume=True)
+    repeated = td.studies.lives(tables, tmp_path, rare=1e-4)
     assert len(requested) == count
     assert repeated.quantiles[0] == result.quantiles[0]
 

@@ -67,7 +67,7 @@ def test_the_command_draws_patterns_and_resumes(scene, tmp_path, capsys):
     assert (tmp_path / "mistuning.png").stat().st_size > 5000
     table = (tmp_path / "patterns.csv").read_text(encoding="utf-8").splitlines()
     assert table[0].startswith("pattern,status,amplification,amplitude,peak_frequency,blade")
-    cli.app([*words, "--resume"], result_action="return_value")
+    cli.app(words, result_action="return_value")
     assert json.loads(capsys.readouterr().out) == record
 
 

@@ -142,7 +142,7 @@ def test_the_linear_scene_comes_to_its_corner_and_resumes(tmp_path: Path, capsys
     statement, rows = json.loads(capsys.readouterr().out), (folder / "rows.jsonl").read_text(encoding="utf-8")
     assert len(statement.pop("files")) == 2
     assert (folder / "optimum.png").stat().st_size > 5000
-    optimum = td.studies.optimise(file, folder, workers=1, resume=True)
+    optimum = td.studies.optimise(file, folder, workers=1)
     assert optimum.record() == statement == json.loads((folder / "optimum.json").read_text(encoding="utf-8"))
     assert (folder / "rows.jsonl").read_text(encoding="utf-8") == rows
     keys, amplitude = optimum.keys(optimum.best), optimum.values(optimum.best)["amplitude_first"]

@@ -176,14 +176,14 @@ def test_resuming_repeats_nothing_and_takes_what_a_larger_study_shares(done, tmp
             yield RunRow(task.number, task.key, "failed", "at 400 Hz")
 
     monkeypatch.setattr(pool, "finished", pretend)
-    computed = td.studies.grid(TABLES, tmp_path, resume=True)
+    computed = td.studies.grid(TABLES, tmp_path)
     assert requested == []
     assert (tmp_path / "study.csv").read_bytes() == (done / "study.csv").read_bytes()
     larger = TABLES | {"vary": {FRICTION: [0.2, 0.3], PRESS: ["10 kN", "20 kN"]}}
-    computed = td.studies.grid(larger, tmp_path, resume=True)
+    computed = td.studies.grid(larger, tmp_path)
     assert requested == [1, 2]
     assert list(computed.columns["status"]) == ["failed", "failed", "complete", "complete"]
-    td.studies.grid(larger, tmp_path, resume=True)
+    td.studies.grid(larger, tmp_path)
     assert requested == [1, 2]  # what failed fails again
     td.studies.grid(larger, tmp_path, retry=True)
     assert requested == [1, 2, 1, 2]
@@ -233,7 +233,7 @@ def test_the_command_resumes_a_study_that_was_killed(done, tmp_path, capsys):
     while any(_runs(pid) for pid in base):
         assert time.monotonic() < end  # none waits for ever for a study that is gone
         time.sleep(0.05)
-    out = printed_text([*words, "--resume", "--json"], capsys)
+    out = printed_text([*words, "--json"], capsys)
     assert json.loads(out)["runs"] == {"complete": 2, "failed": 0, "refused": 2, "defect": 0, "lost": 0}
     after = journal.rows()
     assert all(after[key].seconds == row.seconds for key, row in before.items())

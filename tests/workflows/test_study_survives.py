@@ -160,9 +160,7 @@ def test_a_killed_worker_and_a_killed_scheduler_lose_nothing(kind: Any, tmp_path
     assert 2 <= len(before) < RUNS
 
     repeated = kind() if kind is InProcess else None
-    computed = td.studies.grid(
-        TABLES, folder, workers=1, scheduler=repeated.address if repeated else "local", resume=True
-    )
+    computed = td.studies.grid(TABLES, folder, workers=1, scheduler=repeated.address if repeated else "local")
     if repeated:
         repeated.kill_scheduler()
     assert computed.count("complete") == RUNS

@@ -8,7 +8,7 @@ from __future__ import annotations
 import inspect
 import json
 import re
-import shlex
+import sys
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from os import PathLike
@@ -18,7 +18,7 @@ from typing import Annotated, Any, Literal, Union, get_args, get_origin, get_typ
 
 from cyclopts import App, Parameter
 
-from tribodyn.extras import package
+from tribodyn.extras import MissingPackage, package
 from tribodyn.output_file import printable
 from tribodyn.refusal import Refusal, SolveFailed
 from tribodyn.workflows.result import store
@@ -125,7 +125,7 @@ class Option:
 def word(study: Callable[..., Any], words: str, *, into: Into = "results") -> Callable[..., None]:
     """Make the function behind a word of the command line.
 
-    words : such as "curve backbone", printed in the command that resumes
+    words : such as "curve backbone"
     into : default folder of tables and pictures where --out is not given: results/NAME, the folder of the result, its
         pictures/, the folder of the file, or none"""
     hints = get_type_hints(study, include_extras=True)
@@ -146,7 +146,10 @@ def word(study: Callable[..., Any], words: str, *, into: Into = "results") -> Ca
         first = next((texts[option.name] for option in options if option.positional), None)
         folder = out or _folder(first, into)
         if writes and folder is not None and into != "here":
-            package("matplotlib")  # before long work: what is written has pictures
+            try:
+                package("matplotlib")
+            except MissingPackage as missing:
+                print(f"no pictures, tables alone: {missing}", file=sys.stderr)
         values = {option.name: option.value(texts[option.name]) for option in options}
         if overrides is not None:
             values["overrides"] = overrides
@@ -157,11 +160,9 @@ def word(study: Callable[..., Any], words: str, *, into: Into = "results") -> Ca
         try:
             result = study(**values)
         except KeyboardInterrupt:
-            if "resume" not in parameters:
+            if "fresh" not in parameters:
                 raise
-            sets = [word for text in overrides or () for word in ("--set", text)]
-            command = shlex.join(["tribodyn", *words.split(), str(first), *sets, "--out", str(folder), "--resume"])
-            raise KeyboardInterrupt(f"stopped; finished runs are in {folder}: resume with {command}") from None
+            raise KeyboardInterrupt(f"stopped; finished runs are in {folder}: the same command resumes") from None
         if hasattr(result, "write"):
             files = [] if folder is None else result.write(folder)
         else:

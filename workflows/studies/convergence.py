@@ -55,7 +55,7 @@ class Convergence(StudyResult):
 
     def write(self, folder: Path) -> list[Path]:
         """Write a picture of what the settings cost."""
-        return write_files(folder, {}, {f"converge_{self.table.scene}": self.plot()})
+        return write_files(folder, {}, lambda: {f"converge_{self.table.scene}": self.plot()})
 
 
 def converge(

@@ -140,7 +140,7 @@ class ResponseDerivatives(StudyResult):
         rows = self.elasticities
         table = {"parameter": list(rows)}
         columns = {name: [float(row[i]) for row in rows.values()] for i, name in enumerate(self.derivatives.names)}
-        return write_files(folder, {"derivatives": {**table, **columns}}, {"derivatives": self.plot()})
+        return write_files(folder, {"derivatives": {**table, **columns}}, lambda: {"derivatives": self.plot()})
 
     def plot(self) -> Figure:
         """Bars of the elasticities of every number of the whole contact."""

@@ -170,7 +170,7 @@ class TimeComparison(StudyResult):
     def write(self, folder: Path) -> list[Path]:
         """Write verify_FREQUENCY.png."""
         name = f"verify_{self.hertz:.6g}Hz{'' if self.row is None else f'_row{self.row}'}"
-        return write_files(folder, {}, {name: self.plot()})
+        return write_files(folder, {}, lambda: {name: self.plot()})
 
     def plot(self) -> Figure:
         """Waveform of the first output over a period, and the loop of the pair that dissipates most, both ways."""

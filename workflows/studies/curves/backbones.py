@@ -122,10 +122,11 @@ class SceneBackbone(StudyResult):
 
     def write(self, folder: Path) -> list[Path]:
         """Write backbone.csv, backbone.png and, where faces rub, backbone_maps.png."""
-        pictures = {"backbone": self.plot()}
-        maps = backbone_maps(self.balance, self.mode, self.name)
-        if maps is not None:
-            pictures["backbone_maps"] = maps
+
+        def pictures() -> dict[str, Figure]:
+            maps = backbone_maps(self.balance, self.mode, self.name)
+            return {"backbone": self.plot(), **({} if maps is None else {"backbone_maps": maps})}
+
         return write_files(folder, {"backbone": self.columns}, pictures)
 
     def plot(self) -> Figure:

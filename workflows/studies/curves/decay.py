@@ -100,7 +100,7 @@ class Decay(StudyResult):
     def write(self, folder: Path) -> list[Path]:
         """Write ring_down.csv, the displacement over time, and ring_down.png."""
         columns = {"time_s": self.decay.time, "displacement_m": self.decay.displacement}
-        return write_files(folder, {"ring_down": columns}, {"ring_down": self.plot()})
+        return write_files(folder, {"ring_down": columns}, lambda: {"ring_down": self.plot()})
 
     def plot(self) -> Figure:
         """The decay, and frequency and damping from it beside the backbone."""

@@ -11,7 +11,6 @@ import numpy as np
 from tribodyn.hbm.quantity import names_with_error
 from tribodyn.output_file import write_text
 from tribodyn.refusal import Refusal
-from tribodyn.workflows.pictures.figures import write_figure
 from tribodyn.workflows.pictures.matplotlib_names import Figure
 from tribodyn.workflows.run.progress import Progress, Report, reporter
 from tribodyn.workflows.scene import scene_file
@@ -20,6 +19,7 @@ from tribodyn.workflows.scene.load_tables import StaticLoad
 from tribodyn.workflows.scene.matrix_scene import DofLoad
 from tribodyn.workflows.scene.scene_file import AnyPath, SceneError
 from tribodyn.workflows.scene.scene_values import smooth_numbers
+from tribodyn.workflows.studies.files import write_picture
 from tribodyn.workflows.studies.many import quantiles, study_file, study_pictures, study_runs as studies
 from tribodyn.workflows.studies.many.life_fit import PROBED, LifeFit, Quantile, half_width, quantile_of
 from tribodyn.workflows.studies.many.parameter_space import ParameterSpace
@@ -116,7 +116,7 @@ def lives(
     rare: Number | None = None,
     workers: int | None = None,
     scheduler: str = "",
-    resume: bool = False,
+    fresh: bool = False,
     progress: Report = None,
 ) -> LifeDistribution:
     """Life distribution: what life a share of the parts outlives (B10), how sure that is, and what to measure next.
@@ -126,10 +126,10 @@ def lives(
     rare : share of the parts whose value is wanted as well, and that runs are added for, such as 1e-4
     workers : processes; as many as there are cores by default
     scheduler : address of a scheduler of dask.distributed, or "local": processes here
-    resume : take the runs that the folder holds already, and do the others
+    fresh : do again the runs that the folder holds already
     Raises  Refusal: what is asked for cannot be; SolveFailed: no run has the number, a lost scheduler"""
     plan = study_file.read(study)
-    runner = Runner(studies.place(plan, folder), reporter(progress), workers, scheduler, resume)
+    runner = Runner(studies.place(plan, folder), reporter(progress), workers, scheduler, fresh)
     return _distribution(plan, runner, rare)
 
 
@@ -146,7 +146,7 @@ def _distribution(study: ParameterStudy, runner: Runner, rare: float | None) -> 
     probes = [{**middle, **{key: PROBED * middle[key] for key in group}} for group in groups]
     added: list[dict[str, Any]] = [middle, *probes] if probes else []
     while True:
-        next_runner = replace(runner, resume=runner.resume or len(added) > len(groups) + 1)
+        next_runner = replace(runner, fresh=runner.fresh and len(added) <= len(groups) + 1)
         table = studies.run(study, next_runner, added=added, drawn=False)
         life_fit = LifeFit.of(space, table, life_settings.number, study.settings.runs or 0, shares[0], groups)
         sample = Sample.of(life_fit.space, life_fit.surrogate, shares[0] < RARE)
@@ -161,11 +161,11 @@ def _distribution(study: ParameterStudy, runner: Runner, rare: float | None) -> 
         added += [space.run_of(point) for point in points]
     folder = runner.folder
     if study_pictures.shown(table):
-        write_figure(table.plot(), folder / "study.png")
+        write_picture(table.plot, folder / "study.png")
     error, source = _model_error(study, middle, table, folder, runner.progress)
     distribution = _result(study, table, life_fit, sample, shares, error, source)
     write_text(folder / "lives.json", json.dumps(distribution.record(), indent=2) + "\n")
-    write_figure(distribution.plot(), folder / "lives.png")
+    write_picture(distribution.plot, folder / "lives.png")
     return distribution
 
 
@@ -203,7 +203,7 @@ def _model_error(
         with progress.stage("verdict on the run at the medians"):
             row = solve(task)
         journal.path.parent.mkdir(exist_ok=True)
-        journal.begin([row], resume=True)
+        journal.begin([row])
     error = row.numbers.get(f"{quantity}_error")
     if error is None:
         return None, f"the verdict on the run at the medians has none ({row.sentence})"

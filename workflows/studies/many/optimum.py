@@ -18,10 +18,10 @@ import numpy as np
 
 from tribodyn.output_file import write_text
 from tribodyn.refusal import SolveFailed
-from tribodyn.workflows.pictures.figures import write_figure
 from tribodyn.workflows.pictures.matplotlib_names import Figure
 from tribodyn.workflows.run.progress import Report, reporter
 from tribodyn.workflows.scene.scene_file import AnyPath, SceneError
+from tribodyn.workflows.studies.files import write_picture
 from tribodyn.workflows.studies.many import study_file, study_pictures, study_runs as studies
 from tribodyn.workflows.studies.many.distributions import Marginal, si
 from tribodyn.workflows.studies.many.parameter_space import ParameterSpace
@@ -112,7 +112,7 @@ def optimise(
     *,
     workers: int | None = None,
     scheduler: str = "",
-    resume: bool = False,
+    fresh: bool = False,
     progress: Report = None,
 ) -> Optimum:
     """Search for the best designs: least amplitude and longest life, or other aims, over ranges of any keys.
@@ -121,10 +121,10 @@ def optimise(
     folder : folder of optimum.json, optimum.png and the study's tables; results/NAME by default
     workers : processes; as many as there are cores by default
     scheduler : address of a scheduler of dask.distributed, or "local": processes here
-    resume : take the runs that the folder holds already, and what was proposed, and do the others
+    fresh : do again the runs that the folder holds already, and what was proposed
     Raises  Refusal: what is asked for cannot be; SolveFailed: no run keeps the limits, a lost scheduler"""
     plan = study_file.read(study)
-    runner = Runner(studies.place(plan, folder), reporter(progress), workers, scheduler, resume)
+    runner = Runner(studies.place(plan, folder), reporter(progress), workers, scheduler, fresh)
     return _search(plan, runner)
 
 
@@ -134,9 +134,8 @@ def _search(study: ParameterStudy, runner: Runner) -> Optimum:
     study = replace(study, settings=study.settings.model_copy(update={"derivatives": True}))
     proposals: list[dict[str, float]] = []
     while True:
-        table = studies.run(
-            study, replace(runner, resume=runner.resume or bool(proposals)), added=proposals, drawn=False, inside=True
-        )
+        runner = replace(runner, fresh=runner.fresh and not proposals)
+        table = studies.run(study, runner, added=proposals, drawn=False, inside=True)
         evaluated = _evaluate(study, space, table)
         if not evaluated.solved.any():
             raise SolveFailed(f"no run has all numbers; the first: {table.columns[SENTENCE][0]}")
@@ -159,7 +158,7 @@ def _search(study: ParameterStudy, runner: Runner) -> Optimum:
     bounded = {aim.number: tuple(np.flatnonzero(table.values_of(aim.number)[1]).tolist()) for aim in settings.aims}
     optimum = Optimum(study.name, settings.aims, table, tuple(int(row) for row in front), best, bounded)
     write_text(runner.folder / "optimum.json", json.dumps(optimum.record(), indent=2) + "\n")
-    write_figure(optimum.plot(), runner.folder / "optimum.png")
+    write_picture(optimum.plot, runner.folder / "optimum.png")
     return optimum
 
 

@@ -10,12 +10,12 @@ import tomli_w
 
 from tribodyn.hbm.threads import limited, usable
 from tribodyn.refusal import Refusal
-from tribodyn.workflows.pictures.figures import write_figure
 from tribodyn.workflows.run import model_cache
 from tribodyn.workflows.run.checkpoint import alone_in
 from tribodyn.workflows.run.progress import Progress, Report, reporter
 from tribodyn.workflows.scene import scene_file
 from tribodyn.workflows.scene.scene_file import AnyPath, SceneError
+from tribodyn.workflows.studies.files import write_picture
 from tribodyn.workflows.studies.many import parameter_space, pool, study_file, study_pictures
 from tribodyn.workflows.studies.many.pool import Work
 from tribodyn.workflows.studies.many.run_task import RunRow, StudyRun, solve
@@ -28,14 +28,13 @@ class Runner:
     """How and where the runs of a study are done.
 
     folder : of rows, tables and pictures; workers : processes, as many as there are cores where None
-    scheduler : see pool.on_cluster, none where empty; resume : take the rows that `folder` holds of the same runs
-    retry : but those of failed runs"""
+    scheduler : see pool.on_cluster, none where empty; fresh : do again what `folder` holds; retry : failed runs"""
 
     folder: Path
     progress: Progress
     workers: int | None = None
     scheduler: str = ""
-    resume: bool = False
+    fresh: bool = False
     retry: bool = False
 
     def __post_init__(self) -> None:
@@ -49,7 +48,7 @@ def grid(
     *,
     workers: int | None = None,
     scheduler: str = "",
-    resume: bool = False,
+    fresh: bool = False,
     retry: bool = False,
     progress: Report = None,
 ) -> StudyTable:
@@ -62,11 +61,10 @@ def grid(
     folder : folder of tables and pictures; results/NAME by default
     workers : processes; as many as there are cores by default
     scheduler : address of a scheduler of dask.distributed, such as tls://host:8786, or "local": processes here
-    resume : take the runs that the folder holds already, and do the others
-    retry : resume, and do failed runs again
+    fresh : do again the runs that the folder holds already; retry : do failed runs again
     Raises  Refusal: the study asks for what cannot be; SolveFailed: the scheduler was lost"""
     plan = study_file.read(study)
-    return run(plan, Runner(place(plan, folder), reporter(progress), workers, scheduler, resume or retry, retry))
+    return run(plan, Runner(place(plan, folder), reporter(progress), workers, scheduler, fresh, retry))
 
 
 def place(study: ParameterStudy, folder: AnyPath | None) -> Path:
@@ -99,7 +97,7 @@ def run(
             if rows:
                 write(study_table := table(study.name, varied, rows, folder), folder)
         if drawn and study_pictures.shown(study_table):
-            write_figure(study_table.plot(), folder / "study.png")
+            write_picture(study_table.plot, folder / "study.png")
     return study_table
 
 
@@ -112,18 +110,21 @@ def finish(
     inside: bool = False,
 ) -> None:
     """Do what the folder does not hold already: every row is on disk, and in `rows`, as it comes; see `run`."""
-    progress, scheduler, resume = runner.progress, runner.scheduler, runner.resume
+    progress, scheduler = runner.progress, runner.scheduler
     journal, refused = Journal(runner.folder), len(rows)
-    earlier, repeated = journal.rows() if resume else {}, ("lost", "failed", "defect") if runner.retry else ("lost",)
+    earlier, repeated = (
+        {} if runner.fresh else journal.rows(),
+        ("lost", *(("failed", "defect") if runner.retry else ())),
+    )
     finished_rows = [replace(earlier[task.key], run=task.number) for task in tasks if task.key in earlier]
     finished_rows = [row for row in finished_rows if row.status not in repeated]
     rows |= {row.run: row for row in finished_rows}
     # rows that are not asked for now stay too: a study that is larger may
-    previous = journal.begin((earlier | {row.key: row for row in finished_rows}).values(), resume)
+    previous = journal.begin((earlier | {row.key: row for row in finished_rows}).values(), runner.fresh)
     if previous:
         progress.say(f"the rows that were here are now {previous}")
-    if resume:
-        progress.say(f"{len(finished_rows)} of {len(tasks) + refused} {noun} are done already")
+    if finished_rows:
+        progress.say(f"{len(finished_rows)} of {len(tasks) + refused} {noun} are done already; --fresh does them again")
     remaining = [task for task in tasks if task.number not in rows]
     count = runner.workers or usable(sys.maxsize)
     elsewhere = scheduler not in ("", pool.LOCAL)

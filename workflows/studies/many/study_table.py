@@ -207,15 +207,15 @@ class Journal:
                 rows_by_key[row.key] = row
         return rows_by_key
 
-    def begin(self, rows: Iterable[RunRow], resume: bool) -> Path | None:
+    def begin(self, rows: Iterable[RunRow], fresh: bool = False) -> Path | None:
         """Begin with rows that are there already; returns where an earlier journal is now, None if none was."""
-        previous = None if resume else set_aside(self.path)
-        fresh = self.path.with_suffix(".new")
-        with fresh.open("w", encoding="utf-8") as file:
+        previous = set_aside(self.path) if fresh else None
+        started = self.path.with_suffix(".new")
+        with started.open("w", encoding="utf-8") as file:
             file.writelines(f"{json.dumps(vars(row))}\n" for row in rows)
             file.flush()
             os.fsync(file.fileno())
-        os.replace(fresh, self.path)
+        os.replace(started, self.path)
         return previous
 
     def add(self, row: RunRow) -> None:

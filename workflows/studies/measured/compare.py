@@ -165,7 +165,7 @@ class MeasurementComparison(StudyResult):
         """Write compare.csv and compare.png."""
         rows = self.rows()
         columns = {n: [row[n] for row in rows] for n in rows[0]}
-        return write_files(folder, {"compare": columns}, {"compare": self.plot()})
+        return write_files(folder, {"compare": columns}, lambda: {"compare": self.plot()})
 
     def plot(self) -> Figure:
         """Amplitude, phase and force over frequency, or frequency, damping and force over amplitude."""

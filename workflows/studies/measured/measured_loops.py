@@ -128,7 +128,7 @@ class MeasuredLoops(StudyResult):
 
     def write(self, folder: Path) -> list[Path]:
         """Write loops.csv, rules.csv, cycles.csv, loops.png, contact.toml and vary.toml."""
-        written = write_files(folder, self.tables(), {"loops": self.plot()})
+        written = write_files(folder, self.tables(), lambda: {"loops": self.plot()})
         head = f"# from {self.source}\n"
         for name, lines in (("contact", self.scene_lines()), ("vary", self.spread_lines())):
             written.append(write_text(folder / f"{name}.toml", head + "\n".join(lines) + "\n"))

@@ -102,17 +102,19 @@ class WornScans(StudyResult):
         table += [] if self.coefficient is None else self.coefficient.lines()
         return table + named_lines([("DOUBTFUL", doubt) for doubt in self._doubts()])
 
-    def write(self, folder: Path) -> list[Path]:
-        """Write worn.csv, a picture of every face, the line of the coefficient, gap.csv and wear.toml for a scene."""
-        pictures = {}
+    def figures(self) -> dict[str, Figure]:
+        """The pictures by name."""
+        pictures = {} if self.coefficient is None else {"coefficient": self.coefficient.plot()}
         for test in self.tests:
             stem = "".join(c if c.isalnum() else "_" for c in test.name)
             for n, face in enumerate(test.faces, 1):
                 title = f"{test.name}, face {n}{'' if face.alignment.is_found else ': DOUBTFUL, no common texture'}"
                 pictures[f"worn_{stem}_{n}"] = _picture(face, title)
-        if self.coefficient is not None:
-            pictures["coefficient"] = self.coefficient.plot()
-        files = write_files(folder, {"worn": self.columns()}, pictures)
+        return pictures
+
+    def write(self, folder: Path) -> list[Path]:
+        """Write worn.csv, a picture of every face, the line of the coefficient, gap.csv and wear.toml for a scene."""
+        files = write_files(folder, {"worn": self.columns()}, self.figures)
         keys = [f"# DOUBTFUL: {doubt}" for doubt in self._doubts()]
         keys += [] if self.coefficient is None else [*self.coefficient.keys(), ""]
         scanned = [(test.name, test.total) for test in self.tests if test.total is not None]

@@ -79,7 +79,7 @@ class Flutter(StudyResult):
             "frequency_Hz": [value.imag / (2 * np.pi) for value in self.eigenvalues.values()],
             "damping": list(self.damping.values()),
         }
-        return write_files(folder, {"flutter": columns}, {"flutter": self.plot()})
+        return write_files(folder, {"flutter": columns}, lambda: {"flutter": self.plot()})
 
     def plot(self) -> Figure:
         """Damping ratio of every wave; those that flutter in red."""

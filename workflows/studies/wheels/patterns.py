@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 
 from tribodyn.hbm.threads import limited
-from tribodyn.workflows.pictures.figures import axes_of, write_figure
+from tribodyn.workflows.pictures.figures import axes_of
 from tribodyn.workflows.pictures.matplotlib_names import Figure
 from tribodyn.workflows.pictures.theme import BLUE, GREY, INK, ORANGE, RED
 from tribodyn.workflows.result.number_format import write_columns
@@ -19,6 +19,7 @@ from tribodyn.workflows.run.checkpoint import alone_in
 from tribodyn.workflows.run.progress import Report, reporter
 from tribodyn.workflows.scene import scene_file
 from tribodyn.workflows.scene.scene_file import AnyPath, Overrides, SceneFile, Source, read_scene
+from tribodyn.workflows.studies.files import write_picture
 from tribodyn.workflows.studies.many.run_task import RunRow, StudyRun, outcome_of
 from tribodyn.workflows.studies.many.study_runs import Runner, finish
 from tribodyn.workflows.studies.study_result import StudyResult
@@ -164,7 +165,7 @@ def patterns(
     folder: AnyPath | None = None,
     *,
     workers: int | None = None,
-    resume: bool = False,
+    fresh: bool = False,
     overrides: Overrides = (),
     progress: Report = None,
 ) -> Patterns:
@@ -173,12 +174,12 @@ def patterns(
     scene : name of a scene with [wheel] and [mistuning], or a .toml file
     folder : folder of the table and its picture, in which rows are as they come; results/NAME by default
     workers : processes; as many as there are cores by default
-    resume : take the rows that the folder holds of the same patterns
+    fresh : draw again the patterns that the folder holds already
     Raises  SceneError"""
     file, report = read_scene(scene, overrides), reporter(progress)
     folder = Path("results") / file.name if folder is None else Path(folder)
     mistuning, wheel = asked_of(file), wheel_scene(file).wheel
-    runner = Runner(folder, report, workers, resume=resume, retry=resume)
+    runner = Runner(folder, report, workers, fresh=fresh, retry=True)
     folder.mkdir(parents=True, exist_ok=True)
     rows: dict[int, RunRow] = {}
     with alone_in(folder):
@@ -190,5 +191,5 @@ def patterns(
     ends = {"seconds": [row.seconds for row in result.rows], "cause": [row.sentence for row in result.rows]}
     write_columns({**runs, **columns, **ends}, folder / "patterns.csv")
     if result.complete:
-        write_figure(result.plot(), folder / "mistuning.png")
+        write_picture(result.plot, folder / "mistuning.png")
     return result

@@ -86,7 +86,7 @@ class MistunedSectors(StudyResult):
         """Write mistuned.csv, the amplitude of every sector over frequency, mistuned.png, and those of its peak."""
         heights = {f"sector_{n}_m": column for n, column in enumerate(self.heights.T)}
         columns = {"frequency_Hz": self.branch.frequency, **heights}
-        written = write_files(folder, {"mistuned": columns}, {"mistuned": self.plot()})
+        written = write_files(folder, {"mistuned": columns}, lambda: {"mistuned": self.plot()})
         return written if isinstance(self.peak, NoDerivative) else [*written, *self.peak.write(folder)]
 
     def plot(self) -> Figure:

@@ -110,7 +110,7 @@ class WheelModes(StudyResult):
             units = {"speed": "speed_Hz", "frequency": "frequency_Hz"}
             names = ("contact", *(each.name for each in fields(Crossing)))
             tables["safe"] = {units.get(name, name): [row[name] for row in rows] for name in names}
-        return write_files(folder, tables, self.figures(), self.formats)
+        return write_files(folder, tables, self.figures, self.formats)
 
 
 def _named(state: str) -> str:
