@@ -61,14 +61,9 @@ class ContactParameters:
 
     @classmethod
     def of(
-        cls,
-        components: tuple[str, ...],
-        stiffness: np.ndarray,
-        *,
-        gap: np.ndarray | float = 0.0,
-        table: np.ndarray | None = None,
-        **numbers: np.ndarray | float,
-    ) -> ContactParameters:
+        cls, components: tuple[str, ...], stiffness: np.ndarray, *, gap: np.ndarray | float = 0.0,
+        table: np.ndarray | None = None, **numbers: np.ndarray | float,
+    ) -> ContactParameters:  # fmt: skip
         """Parameters with scalars spread over all pairs; numbers : of the law, by name.
 
         Raises  Refusal for values that no contact can have; a `Joint` checks the numbers of the law"""

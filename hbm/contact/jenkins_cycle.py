@@ -38,15 +38,9 @@ from tribodyn.hbm.harmonics import HarmonicBasis
 
 
 def cycle(
-    x: np.ndarray,
-    parameters: ContactParameters,
-    memory: np.ndarray,
-    basis: HarmonicBasis,
-    jacobian: bool = True,
-    *,
-    friction: np.ndarray | float = 0.0,
-    normal_load: np.ndarray | float = 0.0,
-) -> ContactCycle:
+    x: np.ndarray, parameters: ContactParameters, memory: np.ndarray, basis: HarmonicBasis, jacobian: bool = True, *,
+    friction: np.ndarray | float = 0.0, normal_load: np.ndarray | float = 0.0,
+) -> ContactCycle:  # fmt: skip
     """The periodic cycle of a law of the Jenkins family.
 
     x : (n_pair, n_component, n_coeff) [m]; memory : (n_pair, n_tangential) slider positions at the start [m]

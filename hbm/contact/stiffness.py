@@ -79,15 +79,9 @@ def require_positive(**lengths: float) -> None:
 
 @cache
 def rectangular_punch(
-    a: float,
-    b: float,
-    E1: float,
-    nu1: float,
-    E2: float,
-    nu2: float,
-    edge_radius: float = 0.0,
+    a: float, b: float, E1: float, nu1: float, E2: float, nu2: float, edge_radius: float = 0.0,
     load: float | None = None,
-) -> tuple[float, float]:
+) -> tuple[float, float]:  # fmt: skip
     """Total tangent stiffness (k_n, k_t) [N/m] of a rectangular patch, without slip.
 
     a : full side along the direction of shear [m]

@@ -77,14 +77,9 @@ def ring_down(balance: HarmonicBalance, mode: Backbone, periods: int, steps: int
 
 @single
 def hammer(
-    balance: HarmonicBalance,
-    impulse: float,
-    omega: float,
-    output: str,
-    periods: int,
-    steps: int = 256,
+    balance: HarmonicBalance, impulse: float, omega: float, output: str, periods: int, steps: int = 256,
     least: float = 0.0,
-) -> RingDown:
+) -> RingDown:  # fmt: skip
     """Let the structure swing freely after a blow on it at rest.
 
     impulse : of the blow, where and in which direction the vibrating load acts [N s]; it takes no time, and what is so

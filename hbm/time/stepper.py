@@ -281,15 +281,9 @@ def _free_modes(system: SecondOrderSystem) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _exact_step(
-    lam: np.ndarray,
-    damping: np.ndarray,
-    flow: np.ndarray | None,
-    diagonal: bool,
-    h: float,
-    load: np.ndarray,
-    basis: HarmonicBasis,
-    omega: float,
-) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    lam: np.ndarray, damping: np.ndarray, flow: np.ndarray | None, diagonal: bool, h: float, load: np.ndarray,
+    basis: HarmonicBasis, omega: float,
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:  # fmt: skip
     """E, Q and the impulse per coefficient of the loads (2 m, n_coeff) at the start of the step; see `time_step`.
 
     load : (m, n_coeff) modal load. All are exponentials of the step's motion together with what drives it"""

@@ -130,13 +130,9 @@ def integrate(
 
 @single
 def march_freely(
-    balance: HarmonicBalance,
-    omega: float,
-    start: State,
-    periods: int,
-    options: Options | None = None,
+    balance: HarmonicBalance, omega: float, start: State, periods: int, options: Options | None = None,
     added: float = 0.0,
-) -> FreeMotion:
+) -> FreeMotion:  # fmt: skip
     """March from a balance state and see where the motion goes, periodic or not.
 
     added : damping ratio that sustains the start where it is a point of a nonlinear mode, gone at t = 0

@@ -110,14 +110,9 @@ class WearingBalance:
     reference_stiffness : (n_pair * n_duty * n_component,) stuck springs [N/m]"""
 
     def __init__(
-        self,
-        balances: Sequence[HarmonicBalance],
-        shares: Sequence[float],
-        base: np.ndarray,
-        cycles: float,
-        gain: np.ndarray,
-        guess: np.ndarray,
-    ):
+        self, balances: Sequence[HarmonicBalance], shares: Sequence[float], base: np.ndarray, cycles: float,
+        gain: np.ndarray, guess: np.ndarray,
+    ):  # fmt: skip
         self.balances, self.shares, self.base, self.cycles, self.gain = balances, shares, base, cycles, gain
         self._guess = np.maximum(guess, base)
         first = balances[0]
