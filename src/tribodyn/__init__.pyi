@@ -1,5 +1,6 @@
 # The names of the front door, each with its home: read by type checkers, and by __init__.py when a name is first used.
 from tribodyn import matrices as matrices, plot as plot, studies as studies, wheel as wheel
+from tribodyn.hbm.contact.law_check import check_law as check_law
 from tribodyn.hbm.wear.law import Exposure as Exposure
 from tribodyn.refusal import SolveFailed as SolveFailed
 from tribodyn.version import __version__ as __version__

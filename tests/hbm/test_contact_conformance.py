@@ -6,15 +6,14 @@ import numpy as np
 import pytest
 import scipy.linalg as sla
 
+import tribodyn as td
 from tests.helpers.contact_draws import (
     CLOSED_FORMS,
     EVENT_BASED,
     HARMONICS,
     LAWS,
     TEST_LAWS,
-    draw,
     law_id,
-    law_numbers,
     slip_limit,
     tangential,
     unit_scale,
@@ -27,8 +26,9 @@ from tribodyn.hbm import newton
 from tribodyn.hbm.balance import HarmonicBalance
 from tribodyn.hbm.contact import aft, contact_law
 from tribodyn.hbm.contact.compiled_law import pointer
-from tribodyn.hbm.contact.contact_law import SEPARATES, SLIPS, STICKS, ContactParameters
+from tribodyn.hbm.contact.contact_law import SLIPS, STICKS, ContactParameters
 from tribodyn.hbm.contact.joint import Joint
+from tribodyn.hbm.contact.law_check import draw, errors_of_cycles, errors_of_steps, law_numbers
 from tribodyn.hbm.excitation import Excitation
 from tribodyn.hbm.harmonics import HarmonicBasis
 from tribodyn.hbm.linear.recovery import coordinates
@@ -66,35 +66,30 @@ def test_the_laws_of_the_tests_are_among_them():
 
 
 @EVERY_LAW
-def test_step_derivatives_equal_differences_of_order_six(name, components):
-    law = contact_law.load(name)
-    basis = HarmonicBasis((0, 1), 8)
-    x, parameters, _ = draw(name, components, basis, 200, seed=1)
-    n_comp, n_state = len(components), law.n_state(components)
-    memory = np.random.default_rng(2).normal(size=(200, n_state))
-    stencil, weights = np.array([-3, -2, -1, 1, 2, 3]), np.array([-1, 9, -45, 45, -9, 1]) / 60
-    checked, observed = 0, 0
+def test_the_checks_of_a_users_law_pass_closely(name, components):
+    """Derivatives of a step equal differences of order six."""
+    errors = errors_of_steps(name, components)
+    assert errors == {"derivatives of a step": pytest.approx(0.0, abs=4e-11), **dict.fromkeys(list(errors)[1:], 0.0)}
+    for way in transitions_of(name, components):
+        errors = errors_of_cycles(name, components, way)
+        assert errors["derivatives of a cycle"] < 1e-6
+        assert all(errors[key] < 1e-11 for key in list(errors)[1:])
 
-    def advance(i, z):
-        s, f = z[n_comp:].copy(), np.zeros(n_comp)
-        d = [np.zeros((a, b)) for a in (n_comp, n_state) for b in (n_comp, n_state)]
-        bits = law.step(z[:n_comp].copy(), s, parameters.packed()[i], f, *d)
-        return bits, np.concatenate([f, s]), np.block([[d[0], d[1]], [d[2], d[3]]])
 
-    for i in range(200):
-        z = np.concatenate([x[i] @ basis.synthesis[3], memory[i]])
-        bits, _, slope = advance(i, z)
-        for column in range(len(z)):
-            step = 1e-3 * np.eye(len(z))[column]
-            nearby = [advance(i, z + k * step) for k in stencil]
-            if all(b == bits for b, _, _ in nearby):
-                difference = sum(w * out for w, (_, out, _) in zip(weights, nearby, strict=True)) / 1e-3
-                np.testing.assert_allclose(slope[:, column], difference, atol=2e-11 * (1 + np.abs(difference).max()))
-                checked += 1
-                observed |= bits
-    assert checked > 100 * len(components)
-    if n_state > 0:
-        assert observed & (SLIPS | STICKS) == SLIPS | STICKS
+@pytest.mark.parametrize(
+    ("right", "wrong", "errors"),
+    [
+        ("k * (x[c] - s[c])", "k * (s[c] - x[c])", {"derivatives of a step", "no repeating cycle"}),
+        ("dfs[c, c] = -k", "dfs[c, c] = k", {"derivatives of a step", "derivatives of a cycle"}),
+        ("bits |= SLIPS", "bits |= 8", {"no status or force"}),
+        ("s[c] = x[c] - f[c] / k", "s[c] = x[c]", {"no repeating cycle"}),
+    ],
+)
+def test_faults_of_a_law_are_named(right, wrong, errors, tmp_path):
+    (tmp_path / "law.py").write_text((TEST_LAWS / "slip_force.py").read_text().replace(right, wrong))
+    verdict = td.check_law(tmp_path / "law.py")
+    assert verdict.startswith("law: not a contact law yet")
+    assert errors <= {line[4:29].strip() for line in verdict.splitlines() if line.startswith("BAD")}
 
 
 @EVERY_LAW
@@ -150,28 +145,6 @@ def test_friction_stays_within_its_limit_and_the_normal_force_pushes(name, compo
     t = force[:, tangential(components)]
     size = np.linalg.norm(t, axis=1) if depends_on_path(name, components) else np.abs(t).max(axis=1)
     assert np.all(size <= slip_limit(name, parameters, normal) * (1 + 1e-12) + 1e-14)
-
-
-@EVERY_LAW
-def test_no_law_makes_energy(name, components):
-    """Work of the tangential forces over a cycle; exactly >= 0 where sampled closed or located, not where a pair lifts.
-
-    Without friction it is zero: to rounding if located or smooth."""
-    law = contact_law.load(name)
-    t = tangential(components)
-    for way in transitions_of(name, components):
-        basis = HarmonicBasis((0, 1, 2, 3), 256, way)
-        x, parameters, memory = draw(name, components, basis, 300, seed=7)
-        cycle = aft.cycle(law, x, parameters, basis, memory)
-        scale = np.abs(cycle.force).max() * np.abs(x).max()
-        work = basis.work_per_cycle(cycle.force, x)
-        opens = (cycle.status & SEPARATES) > 0 if way == "sampled" else np.zeros(300, bool)
-        if law.n_state(components) == 0:
-            assert np.abs(work[~opens]).max() < 1e-13 * scale
-        else:
-            assert work[~opens][:, t].min() >= -1e-13 * scale
-            assert work[opens][:, t].min(initial=0.0) >= -1e-3 * scale
-            assert np.all(np.abs(work[(cycle.status & SLIPS) == 0][:, t]) < 1e-3 * scale)
 
 
 @EVERY_LAW

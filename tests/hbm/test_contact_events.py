@@ -7,7 +7,7 @@ import numba
 import numpy as np
 import pytest
 
-from tests.helpers.contact_draws import CLOSED_FORMS, HARMONICS, draw, law_id
+from tests.helpers.contact_draws import CLOSED_FORMS, HARMONICS, law_id
 from tests.helpers.verification_models import oscillator, slab
 from tribodyn.fem.interface import ContactInterface
 from tribodyn.hbm import newton
@@ -15,6 +15,7 @@ from tribodyn.hbm.balance import HarmonicBalance
 from tribodyn.hbm.contact import contact_law, event_cycle
 from tribodyn.hbm.contact.contact_law import STICKS, ContactParameters
 from tribodyn.hbm.contact.joint import Joint, joint_transitions
+from tribodyn.hbm.contact.law_check import draw
 from tribodyn.hbm.continuation.methods import arc_length
 from tribodyn.hbm.excitation import Excitation
 from tribodyn.hbm.harmonics import HarmonicBasis

@@ -8,10 +8,11 @@ import numpy as np
 import pytest
 from hypothesis import given, strategies as st
 
-from tests.helpers.contact_draws import CLOSED_FORMS, HARMONICS, draw, law_id, law_numbers
+from tests.helpers.contact_draws import CLOSED_FORMS, HARMONICS, law_id
 from tests.helpers.random_problems import cases
 from tribodyn.hbm.contact import aft, contact_law, jenkins_cycle, segment_integrals, trigonometric
 from tribodyn.hbm.contact.contact_law import SEPARATES, SLIPS, STICKS, ContactParameters
+from tribodyn.hbm.contact.law_check import draw, law_numbers
 from tribodyn.hbm.harmonics import HarmonicBasis
 
 EVERY_LAW = pytest.mark.parametrize(("name", "components"), CLOSED_FORMS, ids=law_id)

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.optimize import brentq
 
-from tests.helpers.contact_draws import EVENT_BASED, LAWS, law_id, law_numbers
+from tests.helpers.contact_draws import EVENT_BASED, LAWS, law_id
 from tests.helpers.verification_models import interface, modal_damping, random_structure
 from tribodyn.fem.system import SecondOrderSystem
 from tribodyn.hbm import newton
@@ -14,6 +14,7 @@ from tribodyn.hbm.balance import HarmonicBalance
 from tribodyn.hbm.contact import contact_law
 from tribodyn.hbm.contact.contact_law import ContactParameters
 from tribodyn.hbm.contact.joint import Joint
+from tribodyn.hbm.contact.law_check import law_numbers
 from tribodyn.hbm.derivatives.adjoint_gradient import Gradient, cycle_numbers
 from tribodyn.hbm.derivatives.cycle_derivatives import at_frequency, at_peak, peak_moves
 from tribodyn.hbm.derivatives.derivative_rules import NoDerivative

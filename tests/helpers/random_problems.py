@@ -12,13 +12,14 @@ import numpy as np
 import scipy.linalg as sla
 from hypothesis import HealthCheck, settings, strategies as st
 
-from tests.helpers.contact_draws import EVENT_BASED, LAWS, law_numbers
+from tests.helpers.contact_draws import EVENT_BASED, LAWS
 from tests.helpers.verification_models import interface, modal_damping
 from tribodyn.fem.system import SecondOrderSystem
 from tribodyn.hbm.balance import HarmonicBalance
 from tribodyn.hbm.contact import aft, contact_law
 from tribodyn.hbm.contact.contact_law import ContactParameters
 from tribodyn.hbm.contact.joint import Joint
+from tribodyn.hbm.contact.law_check import law_numbers
 from tribodyn.hbm.excitation import Excitation
 from tribodyn.hbm.harmonics import HarmonicBasis
 from tribodyn.reduction.model import ReducedModel
