@@ -21,13 +21,9 @@ from tribodyn.fem.surface import NINE_NODE_QUADS, side_functions, side_polygons,
 
 
 def mortar_halves(
-    first_side: Side,
-    second_side: Side,
-    t1: Sequence[float] | None,
-    components: Sequence[str],
-    reach: float,
+    first_side: Side, second_side: Side, t1: Sequence[float] | None, components: Sequence[str], reach: float,
     vertices_only: bool = False,
-) -> tuple[ContactInterface, csr_matrix]:
+) -> tuple[ContactInterface, csr_matrix]:  # fmt: skip
     """Both halves of a contact, as `ContactFaces.halves` gives them, with the gap of the geometry.
 
     t1, components, vertices_only : as of `ContactFaces`

@@ -87,18 +87,11 @@ class Part:
 
 
 def build(
-    mesh: Any,
-    node_sets: Mapping[str, np.ndarray],
-    material: Any,
-    clamps: Sequence[Clamp],
-    contacts: Sequence[ContactFaces],
-    loads: Mapping[str, Load],
-    outputs: Mapping[str, Load],
-    springs: Sequence[StiffnessElement] = (),
-    held_motions: Sequence[NoMeanRotation] = (),
-    constraints: Sequence[Constraint] = (),
-    masses: Sequence[Mass] = (),
-) -> Part:
+    mesh: Any, node_sets: Mapping[str, np.ndarray], material: Any, clamps: Sequence[Clamp],
+    contacts: Sequence[ContactFaces], loads: Mapping[str, Load], outputs: Mapping[str, Load],
+    springs: Sequence[StiffnessElement] = (), held_motions: Sequence[NoMeanRotation] = (),
+    constraints: Sequence[Constraint] = (), masses: Sequence[Mass] = (),
+) -> Part:  # fmt: skip
     """Assemble a part or an assembly, hold it, and define where it touches, is loaded and is observed.
 
     mesh, node_sets : as geometry.mesh.read gives them, or an Assembly and its node sets

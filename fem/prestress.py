@@ -48,13 +48,9 @@ class Prestress:
 
 
 def solve_prestress(
-    part: Part,
-    material: Material | Mapping[str, Material],
-    at_rest: Callable[[csr_matrix], np.ndarray],
-    start: np.ndarray,
-    softening: Any = 0,
-    temperature: np.ndarray | None = None,
-) -> Prestress:
+    part: Part, material: Material | Mapping[str, Material], at_rest: Callable[[csr_matrix], np.ndarray],
+    start: np.ndarray, softening: Any = 0, temperature: np.ndarray | None = None,
+) -> Prestress:  # fmt: skip
     """The equilibrium whose stress stiffens the part that rests in it: the fixed point of q = at_rest(K(q)).
 
     material : the one it was built with; at_rest : displacement (n_free,) [m] at rest of a part of this stiffness

@@ -201,13 +201,9 @@ def _solve(
 
 
 def _search(
-    balance: Balance[Frequency, Evaluated],
-    omega: Frequency,
-    state: Evaluated,
-    direction: np.ndarray,
-    error: float,
+    balance: Balance[Frequency, Evaluated], omega: Frequency, state: Evaluated, direction: np.ndarray, error: float,
     x_lin: np.ndarray,
-) -> tuple[Evaluated, float]:
+) -> tuple[Evaluated, float]:  # fmt: skip
     """Backtrack until the residual falls; the derivative has kinks, so the best trial is kept if none falls enough.
 
     Source  parabola through |R|^2, its slope and the last trial, Kelley 1995, 8.3.1"""

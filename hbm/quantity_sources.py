@@ -78,13 +78,9 @@ class SolvedCycle:
 
     @classmethod
     def at_row(
-        cls,
-        history: WearHistory,
-        row: int,
-        basis: HarmonicBasis,
-        joints: Mapping[str, slice],
+        cls, history: WearHistory, row: int, basis: HarmonicBasis, joints: Mapping[str, slice],
         places: tuple[StressPlace, ...] = (),
-    ) -> SolvedCycle:
+    ) -> SolvedCycle:  # fmt: skip
         """The cycle of a row of a wear history; its displacement and force are left out."""
         in_time = history.in_time[row]
         height = float(amplitude(history.response[row, 0], basis.harmonics) if in_time else history.amplitude[row])

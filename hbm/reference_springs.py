@@ -24,14 +24,9 @@ def _against(matrix: Any, b: Any) -> np.ndarray:
 
 
 def reference_springs(
-    springs: np.ndarray,
-    model: ReducedModel,
-    basis: HarmonicBasis,
-    omega_max: float,
-    hard: float = 1e5,
-    cut: float = 1e2,
-    most_unknowns: int = 3000,
-) -> np.ndarray:
+    springs: np.ndarray, model: ReducedModel, basis: HarmonicBasis, omega_max: float, hard: float = 1e5,
+    cut: float = 1e2, most_unknowns: int = 3000,
+) -> np.ndarray:  # fmt: skip
     """Springs (n_pair, n_component) [N/m], those harder than `hard` times the body cut to `cut` times it.
 
     Where body and springs are both zero, as of a mass on a cubic spring, the reference is the inertia at omega_max. All

@@ -24,14 +24,9 @@ from tribodyn.refusal import Refusal
 
 
 def craig_bampton(
-    system: SecondOrderSystem,
-    interface: ContactInterface,
-    n_modes: int | None = None,
-    cutoff: float | None = None,
-    extra_masters: Sequence[int] | np.ndarray = (),
-    solver: str | None = None,
-    held_rows: np.ndarray | None = None,
-) -> ReducedModel:
+    system: SecondOrderSystem, interface: ContactInterface, n_modes: int | None = None, cutoff: float | None = None,
+    extra_masters: Sequence[int] | np.ndarray = (), solver: str | None = None, held_rows: np.ndarray | None = None,
+) -> ReducedModel:  # fmt: skip
     """Reduce a full system to its contact DOFs, accessory DOFs, fixed-interface modes and static shapes.
 
     system : sparse, n_full DOFs; interface : B over the same DOFs

@@ -107,18 +107,11 @@ class ForeignMatrices:
         )
 
     def contact(
-        self,
-        body1: Sequence[Sequence[Dof]] | np.ndarray,
-        body2: Sequence[Sequence[Dof]] | np.ndarray | None = None,
-        *,
-        area: float | np.ndarray,
-        components: Sequence[str] = ("n",),
-        normal: Sequence[float] | np.ndarray | None = None,
-        t1: Sequence[float] | None = None,
-        signs: Sequence[float] | None = None,
-        gap: float | np.ndarray = 0.0,
-        points: np.ndarray | None = None,
-    ) -> ContactInterface:
+        self, body1: Sequence[Sequence[Dof]] | np.ndarray, body2: Sequence[Sequence[Dof]] | np.ndarray | None = None,
+        *, area: float | np.ndarray, components: Sequence[str] = ("n",),
+        normal: Sequence[float] | np.ndarray | None = None, t1: Sequence[float] | None = None,
+        signs: Sequence[float] | None = None, gap: float | np.ndarray = 0.0, points: np.ndarray | None = None,
+    ) -> ContactInterface:  # fmt: skip
         """The DOFs that touch, pair by pair, against each other or against the ground (body2 None).
 
         body1, body2 : (n_pair, n_component) DOFs that are themselves t1, t2, n as of `components`;
@@ -156,14 +149,9 @@ class ForeignMatrices:
         return interface_of_rows(motion, modelled, frames, area, gap, points)
 
     def contact_rows(
-        self,
-        rows: Any,
-        components: Sequence[str],
-        *,
-        area: float | np.ndarray,
-        gap: float | np.ndarray = 0.0,
+        self, rows: Any, components: Sequence[str], *, area: float | np.ndarray, gap: float | np.ndarray = 0.0,
         points: np.ndarray | None = None,
-    ) -> ContactInterface:
+    ) -> ContactInterface:  # fmt: skip
         """A contact whose relative displacements are any combinations of DOFs, x = w^T q for every row w.
 
         rows : (n_pair * n_component, n) array or sparse matrix, pair by pair, in each the components in order
@@ -211,15 +199,10 @@ def from_arrays(mass: Any, stiffness: Any, damping: Any = None, labels: Labels |
 
 
 def read_matrices(
-    path: str | Path | None = None,
-    *,
-    mass: str | Path | None = None,
-    stiffness: str | Path | None = None,
-    damping: str | Path | None = None,
-    mapping: str | Path | None = None,
-    names: Mapping[str, str] | None = None,
+    path: str | Path | None = None, *, mass: str | Path | None = None, stiffness: str | Path | None = None,
+    damping: str | Path | None = None, mapping: str | Path | None = None, names: Mapping[str, str] | None = None,
     scale: float = 1.0,
-) -> ForeignMatrices:
+) -> ForeignMatrices:  # fmt: skip
     """Read the matrices of a structure.
 
     path : one .npz, .mat, .op4 or DMIG file that holds all of them, by default as M, K and, if present, C (in files of

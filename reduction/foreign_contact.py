@@ -11,13 +11,9 @@ from tribodyn.refusal import Refusal
 
 
 def interface_of_rows(
-    motion: sp.csr_matrix,
-    components: tuple[str, ...],
-    frames: np.ndarray,
-    area: float | np.ndarray,
-    gap: float | np.ndarray,
-    points: np.ndarray | None,
-) -> ContactInterface:
+    motion: sp.csr_matrix, components: tuple[str, ...], frames: np.ndarray, area: float | np.ndarray,
+    gap: float | np.ndarray, points: np.ndarray | None,
+) -> ContactInterface:  # fmt: skip
     """The interface of rows (n_pair * n_component, n_dof); raises Refusal for an empty row and for bad areas."""
     n_pair = len(frames)
     motion.eliminate_zeros()

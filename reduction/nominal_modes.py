@@ -28,13 +28,9 @@ def port_name(k: int) -> str:
 
 
 def nominal_shapes(
-    reduced: ReducedSector,
-    springs: np.ndarray,
-    stiffness: np.ndarray,
-    families: int,
-    loads: Sequence[str],
+    reduced: ReducedSector, springs: np.ndarray, stiffness: np.ndarray, families: int, loads: Sequence[str],
     left_out: float,
-) -> np.ndarray:
+) -> np.ndarray:  # fmt: skip
     """K-orthonormal shapes (n, r) of a sector in which the wheel of sectors alike moves, contacts stuck or nearly free.
 
     springs : (n_pair, n_component) of closed, stuck contacts [N/m]; stiffness : (n, n) the part K that deviates [N/m]

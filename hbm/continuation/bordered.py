@@ -67,14 +67,9 @@ class BorderFailed(SolverFailure):
 
 
 def solve(
-    linear: Linearisation,
-    slope: np.ndarray,
-    border: Direction,
-    metric: Metric,
-    rhs: tuple[np.ndarray, float],
-    tolerance: float,
-    max_products: int,
-) -> tuple[Direction, int]:
+    linear: Linearisation, slope: np.ndarray, border: Direction, metric: Metric, rhs: tuple[np.ndarray, float],
+    tolerance: float, max_products: int,
+) -> tuple[Direction, int]:  # fmt: skip
     """Solve the bordered system by GMRES that keeps its few directions, or directly where it stalls.
 
     slope : (n_contact, n_coeff) dR/dp; border : c, of any norm; rhs : r (n_contact, n_coeff) [m] and s
@@ -145,14 +140,9 @@ def _coarse_inverse(
 
 
 def tangent(
-    path: Parameter,
-    value: float,
-    state: State,
-    border: Direction,
-    metric: Metric,
-    options: NewtonOptions,
+    path: Parameter, value: float, state: State, border: Direction, metric: Metric, options: NewtonOptions,
     tolerance: float,
-) -> Direction:
+) -> Direction:  # fmt: skip
     """Unit tangent of the solution curve at a state, on the side that the border points to; raises BorderFailed."""
     balance, _ = path.place(value)
     linear = balance.linearise(state)

@@ -91,14 +91,9 @@ class PhaseResonance(FreeVibration):
 
 @single
 def phase_resonance(
-    balance: HarmonicBalance,
-    output: str,
-    low: float,
-    high: float,
-    start: float,
-    stop: float,
+    balance: HarmonicBalance, output: str, low: float, high: float, start: float, stop: float,
     options: BackboneOptions | None = None,
-) -> Branch:
+) -> Branch:  # fmt: skip
     """The curve of resonances at which an output lags its force by a quarter of a cycle.
 
     low, high : range [rad/s] of the mode at rest; start, stop : fundamental amplitudes of the output [m], either order

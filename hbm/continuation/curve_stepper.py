@@ -44,14 +44,9 @@ class CurveStepper:
     segments : the curve behind, without its solutions"""
 
     def __init__(
-        self,
-        path: Parameter,
-        options: Options,
-        first: Solution,
-        start: float,
-        stop: float,
+        self, path: Parameter, options: Options, first: Solution, start: float, stop: float,
         heading: Direction | None = None,
-    ):
+    ):  # fmt: skip
         self._path, self._options = path, options
         self._newton = replace(options.newton, max_steps=min(options.newton_limit, options.newton.max_steps))
         self._width = options.width * abs(stop - start)

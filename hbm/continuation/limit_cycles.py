@@ -58,13 +58,9 @@ class LimitCycle:
 
 @single
 def limit_cycles(
-    balance: HarmonicBalance,
-    start: float,
-    stop: float,
-    mode: int | None = None,
-    output: str | None = None,
+    balance: HarmonicBalance, start: float, stop: float, mode: int | None = None, output: str | None = None,
     options: BackboneOptions | None = None,
-) -> tuple[list[LimitCycle], str]:
+) -> tuple[list[LimitCycle], str]:  # fmt: skip
     """Limit cycles between two amplitudes [m] of an output, by rising amplitude, and why there may be others, or none.
 
     mode, output : as for `backbone`; the least damped mode by default

@@ -86,13 +86,9 @@ Changes = Iterable[ParameterChange]
 
 @single
 def at_frequency(
-    balance: HarmonicBalance,
-    state: State,
-    output: str,
-    changes: Changes,
-    wear: Mapping[str, float] | None = None,
+    balance: HarmonicBalance, state: State, output: str, changes: Changes, wear: Mapping[str, float] | None = None,
     options: NewtonOptions | None = None,
-) -> Derivatives:
+) -> Derivatives:  # fmt: skip
     """Derivatives at the fixed frequency of a state, from which it is solved more exactly.
 
     output : the observed one; changes : the parameters; wear : joint -> wear coefficient [m3/J]
@@ -106,13 +102,9 @@ def at_frequency(
 
 @single
 def at_peak(
-    balance: HarmonicBalance,
-    state: State,
-    output: str,
-    changes: Changes,
-    wear: Mapping[str, float] | None = None,
+    balance: HarmonicBalance, state: State, output: str, changes: Changes, wear: Mapping[str, float] | None = None,
     options: NewtonOptions | None = None,
-) -> Derivatives:
+) -> Derivatives:  # fmt: skip
     """Derivatives along the resonance peak next to a state; see `at_frequency`.
 
     Values are those of the peak itself: one Newton step on its condition from the state, `RULES.peak_tolerance` away.

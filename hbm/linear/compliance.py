@@ -51,14 +51,9 @@ class ContactCompliance:
     target_error : relative error of dense compliances at the highest harmonic of omega_max; None for the default"""
 
     def __init__(
-        self,
-        model: ReducedModel,
-        stiffness: np.ndarray,
-        basis: HarmonicBasis,
-        excitation: Excitation,
-        omega_max: float,
-        target_error: float | None = None,
-    ):
+        self, model: ReducedModel, stiffness: np.ndarray, basis: HarmonicBasis, excitation: Excitation,
+        omega_max: float, target_error: float | None = None,
+    ):  # fmt: skip
         self.basis, self.target_error = basis, target_error
         self.k = np.asarray(stiffness, float).ravel()
         self.n_contact = len(self.k)

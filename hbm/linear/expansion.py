@@ -87,14 +87,9 @@ class Expansion:
     Raises  SingularStuckSystem where a motion that nothing resists moves the contacts"""
 
     def __init__(
-        self,
-        system: SecondOrderSystem,
-        b: np.ndarray,
-        stiffness: np.ndarray,
-        ports: np.ndarray,
-        s_max: float,
+        self, system: SecondOrderSystem, b: np.ndarray, stiffness: np.ndarray, ports: np.ndarray, s_max: float,
         target_error: float | None = None,
-    ):
+    ):  # fmt: skip
         target_error = RULES.wanted_error if target_error is None else target_error
         self.n_port, self._n_contact = len(ports), len(b)
         self.s_unit = s_max or 1.0

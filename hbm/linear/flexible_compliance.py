@@ -27,14 +27,9 @@ class RitzExpansion(Expansion):
     Raises  SingularStuckSystem where the stuck structure can move rigidly"""
 
     def __init__(
-        self,
-        system: SecondOrderSystem,
-        b: np.ndarray,
-        stiffness: np.ndarray,
-        ports: np.ndarray,
-        s_max: float,
+        self, system: SecondOrderSystem, b: np.ndarray, stiffness: np.ndarray, ports: np.ndarray, s_max: float,
         residual: ResidualFlexibility,
-    ):
+    ):  # fmt: skip
         self.residual = residual
         self.n_port, self._n_contact = len(ports), len(b)
         self.s_unit = s_max or 1.0

@@ -35,13 +35,9 @@ class LinearSide(Protocol):
 
 
 def compliance_of(
-    model: ReducedModel,
-    stiffness: np.ndarray,
-    basis: HarmonicBasis,
-    excitation: Excitation,
-    omega_max: float,
+    model: ReducedModel, stiffness: np.ndarray, basis: HarmonicBasis, excitation: Excitation, omega_max: float,
     target_error: float | None = None,
-) -> ContactCompliance:
+) -> ContactCompliance:  # fmt: skip
     """The contact compliance of a model; arguments as for `ContactCompliance`."""
     if model.follows_frequency:
         from tribodyn.hbm.linear.line_compliance import line_compliance  # only operating lines of wheels need it

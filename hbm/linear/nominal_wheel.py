@@ -22,14 +22,9 @@ class NominalWheel:
     omega_max : largest excitation frequency to come [rad/s]"""
 
     def __init__(
-        self,
-        model: WaveModel,
-        springs: np.ndarray,
-        basis: HarmonicBasis,
-        excitation: Excitation,
-        omega_max: float,
+        self, model: WaveModel, springs: np.ndarray, basis: HarmonicBasis, excitation: Excitation, omega_max: float,
         ports: tuple[str, ...],
-    ):
+    ):  # fmt: skip
         self.n_sectors = N = model.n_sectors
         self.k = np.asarray(springs, float).ravel()
         system, _ = model.at_index(0)

@@ -81,13 +81,9 @@ class OvertakingEvent:
     search_share : share of the first preload at which higher peaks are searched next; solves : spent"""
 
     def __init__(
-        self,
-        problem: WearProblem,
-        search_problem: WearProblem,
-        accuracy: float,
-        state: WearState,
+        self, problem: WearProblem, search_problem: WearProblem, accuracy: float, state: WearState,
         rows: Sequence[WearRow],
-    ):
+    ):  # fmt: skip
         self._problem, self.search_problem, self._accuracy = problem, search_problem, accuracy
         self._first = first_preload(problem, rows, state) or 1.0
         self.search_share = (

@@ -97,14 +97,9 @@ class BoltsAlone:
 
 
 def tightened(
-    scene: MeshScene,
-    rods: Mapping[str, Bolt],
-    alone: BoltsAlone,
-    remarks: Sequence[str] = (),
-    reached: float = 1e-10,
-    turns: int = 40,
-    largest: float = 1e6,
-) -> dict[str, float]:
+    scene: MeshScene, rods: Mapping[str, Bolt], alone: BoltsAlone, remarks: Sequence[str] = (),
+    reached: float = 1e-10, turns: int = 40, largest: float = 1e6,
+) -> dict[str, float]:  # fmt: skip
     """P of every bolt [N].
 
     rods : the bolts with their stiffness; remarks : on them, see `leaning`

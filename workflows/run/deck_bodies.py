@@ -60,14 +60,9 @@ def with_elements(mesh: Any, node_sets: dict[str, np.ndarray], form: str, body: 
 
 
 def material(
-    source: deck.Deck,
-    name: str,
-    mesh: Any,
-    table: DeckTable,
-    materials: Mapping[str, AnyMaterial],
-    form: str,
+    source: deck.Deck, name: str, mesh: Any, table: DeckTable, materials: Mapping[str, AnyMaterial], form: str,
     deck_name: str = "NAME",
-) -> Any:
+) -> Any:  # fmt: skip
     """Material of a body of a deck, or volume group -> material where it has several. form : of its elements
 
     Raises  Refusal where an element has none or two"""

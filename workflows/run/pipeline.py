@@ -43,13 +43,9 @@ Judge = Callable[[SceneFile, modelling.Model, Result, Progress], Result]
 
 
 def run(
-    file: SceneFile,
-    folder: Path | None,
-    progress: Progress,
-    earlier: Result | None = None,
-    row_only: bool = False,
+    file: SceneFile, folder: Path | None, progress: Progress, earlier: Result | None = None, row_only: bool = False,
     judge: Judge | None = None,
-) -> Result:
+) -> Result:  # fmt: skip
     """Compute everything that a scene asks for, and keep it in `folder`/result.h5 while it grows.
 
     folder : None keeps nothing on disk
