@@ -125,13 +125,9 @@ def facing_gap(heights_1: np.ndarray, heights_2: np.ndarray, mating_height: floa
 
 
 def synthetic_pair(
-    seed: int,
-    size: tuple[float, float] = (2e-3, 5e-3),
-    spacing: float = 10e-6,
-    ridge: float = 6e-6,
-    waviness: float = 0.3e-6,
-    roughness: float = 1e-6,
-) -> tuple[HeightMap, HeightMap]:
+    seed: int, size: tuple[float, float] = (2e-3, 5e-3), spacing: float = 10e-6, ridge: float = 6e-6,
+    waviness: float = 0.3e-6, roughness: float = 1e-6,
+) -> tuple[HeightMap, HeightMap]:  # fmt: skip
     """A made-up pair of faces for the unpublished ones of the rig, in patch coordinates and already facing.
 
     The first has two ridges along its long edges, the second none; both have waviness and roughness.

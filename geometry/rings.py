@@ -47,15 +47,9 @@ def polygon(corners: np.ndarray) -> Curve:
 
 
 def ring(
-    inner: Curve,
-    outer: Curve,
-    angles: int,
-    across: int,
-    z: np.ndarray,
-    volume: str,
-    sides: Mapping[str, str] | None = None,
-    centre: tuple[float, float] = (0.0, 0.0),
-) -> Block:
+    inner: Curve, outer: Curve, angles: int, across: int, z: np.ndarray, volume: str,
+    sides: Mapping[str, str] | None = None, centre: tuple[float, float] = (0.0, 0.0),
+) -> Block:  # fmt: skip
     """Cells between two curves: so many around and across, and between the heights z (k,) [m].
 
     sides : "v-" is the inner one, "v+" the outer one, "w-" and "w+" the ends along z"""

@@ -164,14 +164,9 @@ class FlexibleModel(ReducedModel):
 
 
 def residual_flexibility(
-    system: SecondOrderSystem,
-    interface: ContactInterface,
-    stiffness: np.ndarray,
-    n_modes: int | None = None,
-    cutoff: float | None = None,
-    clusters: int = LIMITS.clusters,
-    solver: str | None = None,
-) -> FlexibleModel:
+    system: SecondOrderSystem, interface: ContactInterface, stiffness: np.ndarray, n_modes: int | None = None,
+    cutoff: float | None = None, clusters: int = LIMITS.clusters, solver: str | None = None,
+) -> FlexibleModel:  # fmt: skip
     """Reduce a full system to modes of its stuck state and Ritz vectors, with the flexibility these leave out.
 
     system : sparse, n_full DOFs; interface : B over the same DOFs

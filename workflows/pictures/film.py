@@ -35,16 +35,10 @@ class FilmFigure(Protocol):
 
 
 def film(
-    result: Result,
-    folder: str | PathLike[str],
-    over: Literal["wear", "cycle"],
-    row: int | None = None,
-    formats: Sequence[str] = ("mp4",),
-    images: int = LAYOUT.images,
-    dpi: int = LAYOUT.film_dpi,
-    deformation: float | None = None,
-    wear: float | None = None,
-) -> list[Path]:
+    result: Result, folder: str | PathLike[str], over: Literal["wear", "cycle"], row: int | None = None,
+    formats: Sequence[str] = ("mp4",), images: int = LAYOUT.images, dpi: int = LAYOUT.film_dpi,
+    deformation: float | None = None, wear: float | None = None,
+) -> list[Path]:  # fmt: skip
     """Write a film of a result into a folder, named wear or cycle_ROW; returns its paths.
 
     over : "wear" shows depth, status and pressure of the opened contact at the wear steps; "cycle" shows part and

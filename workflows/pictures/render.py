@@ -27,13 +27,9 @@ from tribodyn.workflows.result.summary import LARGEST_BEND, size_of
 
 
 def draw(
-    result: Result,
-    folder: Path,
-    deformation: float | None = None,
-    wear: float | None = None,
-    formats: Sequence[str] = ("png",),
-    dpi: int | None = None,
-) -> list[Path]:
+    result: Result, folder: Path, deformation: float | None = None, wear: float | None = None,
+    formats: Sequence[str] = ("png",), dpi: int | None = None,
+) -> list[Path]:  # fmt: skip
     """Write every picture that the result has data for; returns their paths.
 
     deformation, wear : factors by which displacement and depth are exaggerated, chosen by size where None

@@ -91,13 +91,8 @@ def _first(label: str, curves: np.ndarray) -> list[str]:
 
 
 def safe(
-    families: Families,
-    n_sectors: int,
-    slow: float,
-    fast: float,
-    scene: str = "",
-    met: Crossings | None = None,
-) -> Figure:
+    families: Families, n_sectors: int, slow: float, fast: float, scene: str = "", met: Crossings | None = None,
+) -> Figure:  # fmt: skip
     """SAFE diagram: modes over nodal diameters, and what the engine orders reach in a range of speeds.
 
     families : at the highest speed, from which what is met at a lower one may lie apart

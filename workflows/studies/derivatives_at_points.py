@@ -56,13 +56,9 @@ def of_life(
 
 
 def of_branch(
-    scene: Scene,
-    balance: HarmonicBalance,
-    branch: Branch,
-    changes: Iterator[ParameterChange],
-    at: float | None = None,
-    output: str = settings.OUTPUT,
-) -> Derivatives:
+    scene: Scene, balance: HarmonicBalance, branch: Branch, changes: Iterator[ParameterChange],
+    at: float | None = None, output: str = settings.OUTPUT,
+) -> Derivatives:  # fmt: skip
     """At a frequency [Hz], or along the highest peak of a response."""
     options = settings.newton_options(scene)
     fits = branch.amplitude(output) if at is None else -np.abs(branch.frequency - at)

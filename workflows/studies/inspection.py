@@ -108,19 +108,11 @@ class Inspection(StudyResult):
 
 @asks_consent
 def inspect(
-    source: AnyPath,
-    *,
-    unit: str = "m",
-    young: Pressure | None = None,
-    poisson: Number = 0.3,
-    density: Annotated[float | None, quantity("kg/m3")] = None,
-    modes: int = 0,
-    free: bool = False,
-    elements: Literal["deck", "quadratic", "linear_bbar", "linear_reduced"] = "deck",
-    allow_scripts: bool = False,
-    overrides: Overrides = (),
-    progress: Progress | None = None,
-) -> Inspection:
+    source: AnyPath, *, unit: str = "m", young: Pressure | None = None, poisson: Number = 0.3,
+    density: Annotated[float | None, quantity("kg/m3")] = None, modes: int = 0, free: bool = False,
+    elements: Literal["deck", "quadratic", "linear_bbar", "linear_reduced"] = "deck", allow_scripts: bool = False,
+    overrides: Overrides = (), progress: Progress | None = None,
+) -> Inspection:  # fmt: skip
     """Show what a mesh, a deck, a CAD file or a scene holds: size, mass, bodies, groups, worst element, gaps, warnings.
 
     source : a file of a mesh, a deck or a CAD program, a scene's name, or a .toml file

@@ -96,14 +96,9 @@ class LifeFit:
 
     @classmethod
     def of(
-        cls,
-        space: ParameterSpace,
-        table: StudyTable,
-        number: str,
-        drawn: int,
-        share_sought: float,
+        cls, space: ParameterSpace, table: StudyTable, number: str, drawn: int, share_sought: float,
         groups: Sequence[tuple[str, ...]],
-    ) -> LifeFit:
+    ) -> LifeFit:  # fmt: skip
         values, bounds = table.bounded(number)
         open_ = np.isfinite(bounds)
         good = np.isfinite(values)

@@ -85,13 +85,9 @@ class Surrogate:
 
     @classmethod
     def fitted(
-        cls,
-        points: np.ndarray,
-        values: np.ndarray,
-        slopes: np.ndarray | None = None,
-        laws: tuple[Law, ...] = (),
+        cls, points: np.ndarray, values: np.ndarray, slopes: np.ndarray | None = None, laws: tuple[Law, ...] = (),
         is_small: bool = False,
-    ) -> Surrogate:
+    ) -> Surrogate:  # fmt: skip
         """The most likely process: coordinates (n, k) of order 1, values (n,), derivatives (n, k) or nan.
 
         Of a number that has laws no derivatives are taken.
