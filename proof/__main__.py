@@ -14,42 +14,49 @@ from proof.cases.blade.commands import blade
 from proof.cases.leaf_seal.commands import leaf
 from proof.cases.rig.commands import rig
 from proof.words import PICTURE, report_progress
-from tribodyn.refusal import SolverFailure
+from tribodyn.refusal import Refusal, SolverFailure
 from tribodyn.workflows.command.main import guard
 from tribodyn.workflows.command.word import Flag, Json, Overrides, make_room
 
 
-def bench(
-    *,
-    quick: Flag = False,
-    fe: Annotated[tuple[str, ...], Parameter(name="--fe", negative=(), consume_multiple=False)] = (),
-    way: Annotated[tuple[str, ...], Parameter(name="--way", negative=(), consume_multiple=False)] = (),
-    as_json: Json = False,
-) -> None:
-    """Measure the solver beside the dense algorithm of the thesis on the beam scene (tables 7.1 to 7.3).
+def large(*sizes: str, as_json: Json = False) -> None:
+    """Measure time and memory of the reduction of large meshes.
 
     Parameters
     ----------
-    quick
-        Harmonics 0+1 and 0+3 alone, in under a minute.
-    fe
-        Time and memory of a reduction at "30k", "100k", "300k" or "1M" DOFs instead, beside plain statements of the
-        same library, of cubes ("36k-cubes", "140k-cubes", "1M-cubes"), or of an
-        "assembly" of 200 000 DOFs with three joints; can be repeated.
-    way
-        One way of --fe alone: "product", "by hand", "flexibility" (no contact DOFs in the model); can be repeated.
+    sizes
+        Of the beam: "30k", "100k", "300k", "1M" DOFs, or of cubes, "36k-cubes", "140k-cubes", "1M-cubes".
     as_json
         Print JSON for machines."""
-    if fe:
-        from proof import large_fe
+    from proof import large_fe
 
-        costs = large_fe.run(fe, report_progress, way)
-        print(json.dumps([asdict(row) for row in costs], indent=2) if as_json else large_fe.as_text(costs))
-        return
-    from proof import bench as shown
+    costs = large_fe.run(sizes, report_progress)
+    print(json.dumps([asdict(row) for row in costs], indent=2) if as_json else large_fe.as_text(costs))
 
-    rows = shown.run(quick, report_progress)
-    print(json.dumps([asdict(row) for row in rows], indent=2) if as_json else shown.as_text(rows))
+
+def bench(*problems: str, run: Flag = False, truth: Flag = False, page: Flag = False) -> None:
+    """Compare programs on problems of vibration with friction and contact: errors beside the truth, and seconds.
+
+    The files and their format are described in proof/bench/README.md.
+
+    Parameters
+    ----------
+    problems
+        Names of problems; all of them by default.
+    run
+        Compute the columns of tribodyn first and write their files.
+    truth
+        Compute the truth, too.
+    page
+        Print the pages of the problems, with settings, sources and motions."""
+    from proof.bench import pages, problem
+
+    names = problems or tuple(problem.names())
+    if unknown := set(names) - set(problem.names()):
+        raise Refusal(f"there is no problem '{min(unknown)}': there are {', '.join(problem.names())}")
+    if run or truth:
+        pages.compute(names, truth, report_progress)
+    print("\n".join(map(pages.page, names)) if page else pages.table(names))
 
 
 def scoreboard(
@@ -247,7 +254,7 @@ def wear(*, scenes: int = 12, seconds: float = 60.0, as_json: Json = False) -> N
 
 
 app = cyclopts.App(name="prove", help="Proofs of tribodyn: speed, extremes, faults, errors of unseen scenes.")
-for word in (bench, extremes, faults, scoreboard, branches, fuzz, wear, wear_steps, blade, leaf, rig):
+for word in (bench, large, extremes, faults, scoreboard, branches, fuzz, wear, wear_steps, blade, leaf, rig):
     app.command(word)
 
 
