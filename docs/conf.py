@@ -11,7 +11,7 @@ FOLDER = Path(__file__).parent
 sys.path.insert(0, str(FOLDER))
 os.environ["PYTHONPATH"] = os.pathsep.join([str(FOLDER.parent / "src"), *filter(None, [os.environ.get("PYTHONPATH")])])
 os.environ["PYTHONWARNINGS"] = "ignore:IProgress not found"  # it names a path of this machine
-sys.path.insert(0, str(FOLDER.parent / "src"))
+sys.path[:0] = [str(FOLDER.parent / "src"), str(FOLDER.parent)]  # the program, and the proofs with their bench
 
 import docstrings  # noqa: E402
 import examples_pages  # noqa: E402

@@ -17,6 +17,7 @@ from cyclopts import App
 from pydantic import BaseModel
 from pydantic_core import PydanticUndefined
 
+from proof.bench import pages as bench, problem
 from tribodyn.geometry import parts
 from tribodyn.geometry.sources import abaqus_cards, ansys, nastran
 from tribodyn.geometry.sources.card_table import words as words_of
@@ -56,6 +57,7 @@ def write(folder: Path) -> None:
         "cards": cards(),
         "folders": folders(),
         "lines": lines_by_folder(),
+        "bench": "\n".join([bench.table(problem.names()), "", *map(bench.page, problem.names())]),
     }
     (folder / "scene.schema.json").write_text(json.dumps(json_schema.json_schema(), indent=1))
     for name, text in pages.items():

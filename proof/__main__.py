@@ -5,10 +5,8 @@ import os
 from collections.abc import Sequence
 from dataclasses import asdict
 from pathlib import Path
-from typing import Annotated
 
 import cyclopts
-from cyclopts import Parameter
 
 from proof.cases.blade.commands import blade
 from proof.cases.leaf_seal.commands import leaf

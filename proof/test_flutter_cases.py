@@ -33,17 +33,9 @@ CASES = {
 PERIODS = 200
 WITHIN = 0.03  # of a cycle
 KEPT = {  # waves with a limit cycle that time integration keeps
-    "plain": {1},
-    "little preload": {1},
-    "little friction": {1, 2},
-    "much friction": set(),
-    "eight harmonics": {1},
-    "strong flow": {2},
-    "second family": {2},
-    "eight sectors": {2, 3},
-    "every wave": set(),
-    "spinning": {1, 2},
-}
+    "plain": {1}, "little preload": {1}, "little friction": {1, 2}, "much friction": set(), "eight harmonics": {1},
+    "strong flow": {2}, "second family": {2}, "eight sectors": {2, 3}, "every wave": set(), "spinning": {1, 2},
+}  # fmt: skip
 
 
 @pytest.mark.parametrize("case", [pytest.param(c, marks=pytest.mark.slow) for c in CASES])

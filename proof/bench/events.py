@@ -14,15 +14,13 @@ import numpy as np
 import scipy.linalg as sla
 from scipy.optimize import brentq
 
-from proof.bench.problem import Element, Problem
+from proof.bench.problem import Problem
 from proof.bench.record import POINT, Row
 
 OPEN, STICK, FORWARD, BACKWARD = 0, 1, 2, 3
 SIDE = {FORWARD: 1.0, BACKWARD: -1.0}
 Mode = tuple[int, ...]
-STEPS = 512  # of a period
-MOST_EVENTS = 50  # within a time step
-MOST_PERIODS = 600
+STEPS, MOST_EVENTS, MOST_PERIODS = 512, 50, 600  # of a period, within a step, of a march
 TINY = 1e-12  # of its terms, that a guard may be below zero
 SETTLED, UNSETTLED = 1e-10, 1e-6  # change over a period, relative to the motion
 
@@ -190,7 +188,8 @@ def sweep(problem: Problem) -> list[Row]:
 def solve(problem: Problem, omega: float, start: Place | None = None) -> tuple[Row, Place]:
     """The periodic motion that a march leads to, from rest or from a state, and its state."""
     events, drift = Events(problem, omega), np.inf
-    place = start or Place(0.0, tuple(map(_rest, problem.elements)), np.zeros(events.n_z))
+    rest = (OPEN if "n" in e.components else BACKWARD if e.numbers["belt"] else STICK for e in problem.elements)
+    place = start or Place(0.0, tuple(rest), np.zeros(events.n_z))
     for _ in range(MOST_PERIODS):
         z = place.z.copy()
         z[events.one :] = [1.0, *np.tile([1.0, 0.0], len(problem.loads))]
@@ -203,11 +202,6 @@ def solve(problem: Problem, omega: float, start: Place | None = None) -> tuple[R
         if drift < SETTLED:
             break
     return _row(events, places, drift), place
-
-
-def _rest(element: Element) -> int:
-    """Where a march begins: a belt slips under what rests on it."""
-    return OPEN if "n" in element.components else BACKWARD if element.numbers["belt"] else STICK
 
 
 def _row(events: Events, places: list[Place], drift: float) -> Row:

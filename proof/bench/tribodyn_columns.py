@@ -31,8 +31,7 @@ def balance_of(problem: Problem) -> td.matrices.Balance:
     """The harmonic balance of a problem; raises Refusal where an element has no law here."""
     if any(element.numbers["belt"] for element in problem.elements):
         raise Refusal("no contact law has a body that moves on steadily")
-    damping = problem.damping if problem.damping.any() else None
-    matrices, contacts = td.matrices.from_arrays(problem.mass, problem.stiffness, damping), []
+    matrices, contacts = td.matrices.from_arrays(problem.mass, problem.stiffness, problem.damping), []
     for law, group in groupby(sorted(problem.elements, key=_law), key=_law):
         elements = list(group)
         values = {key: np.array([e.numbers[key] for e in elements]) for key in ("gap", "k3", "limit", "friction")}
@@ -47,9 +46,7 @@ def balance_of(problem: Problem) -> td.matrices.Balance:
         rows, components = np.vstack([e.rows for e in elements]), elements[0].components
         face = matrices.contact_rows(rows, components, area=float(len(elements)), gap=values["gap"])
         contacts.append(td.matrices.Contact(law, face, law, tangential, normal, numbers))
-    loads = {
-        f"{name} {h}": v for h, pair in problem.loads.items() for name, v in zip(("cos", "sin"), pair, strict=True)
-    }
+    loads = {f"{part} {h}": pair[i] for h, pair in problem.loads.items() for i, part in enumerate(("cos", "sin"))}
     structure = td.matrices.reduce(
         matrices, contacts, loads={"static": problem.static, **loads}, outputs={"output": problem.output}
     )
@@ -82,10 +79,9 @@ def in_frequency(problem: Problem, balance: td.matrices.Balance) -> tuple[Record
     stable = np.full(len(branch.omega), np.nan) if problem.is_rigid else balance.stability(branch).stable
     curve = zip(
         branch.omega, branch.amplitude("output"), _mean(branch.response[:, 0]),
-        np.angle(branch.fundamental("output")), branch.energy, stable, strict=True,
+        np.angle(branch.fundamental("output")), branch.energy, stable, branch.converged, strict=True,
     )  # fmt: skip
-    rows = [Row(CURVE, w, a, m, p, e, stable=float(s)) for w, a, m, p, e, s in curve]
-    rows = [row for row, solved in zip(rows, branch.converged, strict=True) if solved]
+    rows = [Row(CURVE, w, a, m, p, e, stable=float(s)) for w, a, m, p, e, s, solved in curve if solved]
     motions = Motions()
     for omega in problem.points:
         count = len(motions)
