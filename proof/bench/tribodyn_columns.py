@@ -119,7 +119,7 @@ def _shares(balance: td.matrices.Balance, force: np.ndarray) -> np.ndarray:
             of_joint[:, components.index("n")] if "n" in components else numbers.get("normal_load", np.ones(1))[:, None]
         )
         pull = np.sqrt((of_joint[:, tangential] ** 2).sum(axis=1))
-        limit = numbers.get("friction", np.full(1, np.inf))[:, None] * push
+        limit = numbers.get("friction", np.ones(1))[:, None] * push
         if "cubic" not in numbers:
             slips = (push > 0) & (pull >= limit * (1 - 1e-6))
             lifts = np.broadcast_to(push <= 0, slips.shape)
