@@ -124,14 +124,8 @@ def scaled(body: Body, length: float, force: float) -> Body:
     stiffness, system = force / length, body.model.system
     scaled_system = replace(system, mass=stiffness * system.mass, stiffness=stiffness * system.stiffness)
     o = body.ordinary
-    ordinary = replace(
-        o,
-        tangential=stiffness * o.tangential,
-        normal=stiffness * o.normal,
-        preload=force * o.preload,
-        force=force * o.force,
-        gap=length * o.gap,
-    )
+    springs = {"tangential": stiffness * o.tangential, "normal": stiffness * o.normal}
+    ordinary = replace(o, **springs, preload=force * o.preload, force=force * o.force, gap=length * o.gap)
     return Body(body.name, replace(body.model, system=scaled_system), ordinary)
 
 

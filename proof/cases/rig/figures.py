@@ -23,20 +23,13 @@ MARKS: dict[str, Any] = {"marker": "D", "color": RED, "ls": "none", "ms": 6, "zo
 
 def draw(study: Study, folder: Path) -> list[Path]:
     """Write every figure as a PNG; returns their paths."""
-    figures: dict[str, Callable[[Study], Figure]] = {
-        "energy_against_force": energy_against_force,
-        "contact_area_maps": contact_area_maps,
-        "total_wear": total_wear,
-        "worn_area": worn_area,
-        "loops": loops,
-        "preload": preload,
-        "energy": energy,
-        "response": response,
-    }
+    figures: list[Callable[[Study], Figure]] = [
+        energy_against_force, contact_area_maps, total_wear, worn_area, loops, preload, energy, response,
+    ]  # fmt: skip
     paths = []
-    for name, function in figures.items():
+    for function in figures:
         with mpl.rc_context(STYLE):
-            paths.append(folder / f"{name}.png")
+            paths.append(folder / f"{function.__name__}.png")
             function(study).savefig(paths[-1])
     return paths
 

@@ -133,14 +133,9 @@ class Rig:
         interface, output = balance.model.interface, balance.outputs(state)[0]
         mean = np.tensordot(interface.area / interface.area.sum(), state.x[:, 0], axes=1)
         sliding = balance.basis.to_time(mean)
-        return Cycle(
-            state,
-            float(balance.energy(state).sum()),
-            float(np.ptp(sliding)) / 2,
-            balance.preload(state),
-            _reaction(self.file, model, state),
-            float(np.linalg.norm(output[1:])),
-        )
+        work, stroke, amplitude = balance.energy(state).sum(), np.ptp(sliding) / 2, np.linalg.norm(output[1:])
+        reaction = _reaction(self.file, model, state)
+        return Cycle(state, float(work), float(stroke), balance.preload(state), reaction, float(amplitude))
 
 
 def check(file: SceneFile) -> None:
