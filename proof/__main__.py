@@ -126,14 +126,9 @@ def faults(*, tree: Path = Path(), seconds: float = 20.0, out: Path = Path("faul
 
 
 def fuzz(
-    *,
-    count: int = 1000,
-    prefix: str = "",
-    seed: int = 0,
-    seconds: float = 10.0,
-    workers: int = 1,
+    *, count: int = 1000, prefix: str = "", seed: int = 0, seconds: float = 10.0, workers: int = 1,
     as_json: Json = False,
-) -> None:
+) -> None:  # fmt: skip
     """Damage all input, and report how the runs end.
 
     Several keys and tables at once of small scenes, files of studies, optima and fits, decks and matrices, each run.

@@ -101,8 +101,8 @@ def in_frequency(problem: Problem, balance: td.matrices.Balance) -> tuple[Record
         rows += [] if row.is_in(rows) else [row]
     settings = f"orders {', '.join(map(str, problem.orders))}; {problem.samples} samples; {len(branch.omega)} points"
     settings += f"; springs {SPRINGS:g} times as stiff as the structure" if problem.is_rigid else ""
-    whole = branch.arrived or branch.ended is BranchEnd.CLOSED
-    return Record(_head(problem, settings, seconds, "" if whole else str(branch.end)), tuple(rows)), motions
+    note = "" if branch.arrived or branch.ended is BranchEnd.CLOSED else str(branch.end)
+    return Record(_head(problem, settings, seconds, note), tuple(rows)), motions
 
 
 def _mean(coefficients: np.ndarray) -> np.ndarray:
