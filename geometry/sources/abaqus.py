@@ -220,16 +220,12 @@ def _system(card: Card, scope: Scope) -> None:
 
 
 def _nodes(card: Card, scope: Scope) -> None:
-    letter = card.option("SYSTEM").upper() or "R"
-    kinds = {"R": "rectangular", "C": "cylindrical", "S": "spherical"}
-    if letter not in kinds:
-        raise Refusal(f"{card.where} has the system '{letter}': it is one of R, C, S")
     labels = [card.integer(line[0]) for line in card.data]
     if not labels:
         raise Refusal(f"{card.where} has no nodes: write them in the deck, or take an *INCLUDE")
     places = np.array([card.floats(line[1:], 3) for line in card.data])
-    if letter != "R":
-        places = System(kinds[letter], np.zeros(3), np.eye(3)).places(places)
+    if kind := {"C": "cylindrical", "S": "spherical"}.get(card.option("SYSTEM").upper()[:1]):
+        places = System(kind, np.zeros(3), np.eye(3)).places(places)
     if scope.system is not None:
         places = scope.system.places(places)
     for label, (x, y, z) in zip(labels, places.tolist(), strict=True):

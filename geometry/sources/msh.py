@@ -38,10 +38,13 @@ def content(path: str) -> dict[str, Any]:
     """Let Gmsh read one of its files; see `of_session`. Raises Refusal: it is none, or broken."""
     _check(Path(path))
     with session() as gmsh:
+        gmsh.logger.start()
         try:
             gmsh.merge(path)
         except Exception as problem:
             raise Refusal(_cannot(path, str(problem))) from None
+        for line in (line for line in gmsh.logger.get() if "duplicate" in line):  # of which it takes one in silence
+            raise Refusal(_cannot(path, line))
         return of_session(gmsh)
 
 

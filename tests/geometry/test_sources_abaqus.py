@@ -88,7 +88,6 @@ BROKEN = {
     "half a load": ("RP, 2, -100.", "RP, 2", "needs node, direction and value"),
     "unknown set in a support": ("Foot, ENCASTRE", "Fuss, ENCASTRE", "names 'Fuss'"),
     "generated mesh": ("*Nset, nset=Left", "*Ngen\n1, 9, 2\n*Nset, nset=Left", "generates a mesh"),
-    "unknown system": ("*Node\n      1,           0.", "*Node, system=Q\n      1,           0.", "one of R, C, S"),
     "missing include": ("*Part, name=Block", "*Include, input=gone.inp\n*Part, name=Block",
         "'gone.inp', which does not exist"),
     "only shells": ("type=C3D8R", "type=S4", "no volume elements"),

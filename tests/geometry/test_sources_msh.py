@@ -161,3 +161,7 @@ def test_binary_numbers_that_look_like_a_section_cut_no_file_short(tmp_path):
     path.write_bytes(path.read_bytes().replace(b"$EndNodes", b""))
     with pytest.raises(ValueError, match=r"it ends inside \$Nodes"):
         msh._check(path)
+    nodes = "".join(f"{k + 1} {k & 1} {k & 2} {k & 4}\n" for k in (*range(8), 7))
+    path.write_text(f"$MeshFormat\n2.2 0 8\n$EndMeshFormat\n$Nodes\n9\n{nodes}$EndNodes\n")
+    with pytest.raises(ValueError, match="duplicate node 8"):
+        foreign_file.read(path)

@@ -107,9 +107,10 @@ def test_no_such_scene_lists_those_there_are() -> None:
 
 def test_broken_toml_says_where(tmp_path) -> None:
     path = tmp_path / "broken.toml"
-    path.write_text("[scene\n")
-    with pytest.raises(SceneError, match=r"broken\.toml is not valid TOML.*line 1"):
-        read(str(path))
+    for text, words in (("[scene\n", "line 1"), ("x = " + "[" * 9999, "recursion"), ("x = " + "9" * 9999, "digits")):
+        path.write_text(text)
+        with pytest.raises(SceneError, match=rf"broken\.toml is not valid TOML.*{words}"):
+            read(str(path))
 
 
 def test_values_arrive_in_si_units() -> None:

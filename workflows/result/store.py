@@ -219,7 +219,7 @@ def load(path: str | os.PathLike[str]) -> Result:
         raise ResultError(f'"{path}": {error}') from None
     except OSError:
         raise ResultError(f'"{path}" is not a result file of tribodyn') from None
-    except (KeyError, TypeError, ValueError):
+    except (KeyError, TypeError, ValueError, RecursionError):
         raise ResultError(f'"{path}" was written by another version of tribodyn: run its scene again') from None
 
 

@@ -125,7 +125,7 @@ def _text(path: Path, kind: str) -> str:
 def _tables(text: str, label: str) -> dict[str, Any]:
     try:
         return tomllib.loads(text)
-    except tomllib.TOMLDecodeError as error:
+    except (ValueError, RecursionError) as error:  # also a number too long, brackets in each other too often
         raise SceneError(f"{label} is not valid TOML: {str(error)[0].lower()}{str(error)[1:]}") from None
 
 
@@ -188,8 +188,8 @@ def _override(data: dict[str, Any], text: str) -> None:
         table.pop(path[-1], None)
         return
     try:
-        table[path[-1]] = tomllib.loads(f"value = {value}")["value"]
-    except tomllib.TOMLDecodeError:
+        table[path[-1]] = _tables.__wrapped__(f"value = {value}", text)["value"]
+    except SceneError:
         table[path[-1]] = value.strip()
 
 
