@@ -143,7 +143,7 @@ def load(path: Path) -> DeckAssembly:
     """Sort the cards of a deck into parts, instances and the rest. Raises Refusal on what cannot be read."""
     parts: dict[str, Scope] = {}
     assembly = DeckAssembly({}, {}, Scope(), [], SkippedCards(TABLE, "*"))
-    scope, flat = assembly.top, True
+    scope = assembly.top
     for card in cards(path):
         assembly.skipped.check_parameters(card.name, card.options)
         if "INPUT" in card.options and card.name in TABLE.reads - {*WITH_INPUT}:
@@ -153,8 +153,8 @@ def load(path: Path) -> DeckAssembly:
                 if ";" in names or len(line) > names.count(",") + 1:
                     assembly.skipped.check_fields(card.name, line, k)
         if card.name == "PART":
-            flat = False
-            scope = parts[card.option("NAME").upper()] = Scope()
+            if parts.setdefault(card.option("NAME").upper(), scope := Scope()) is not scope:
+                raise Refusal(f"{card.where} has the name '{card.option('NAME')}' of another part: give each its own")
         elif card.name == "INSTANCE":
             scope = _instance(card, parts, assembly)
         elif card.name in ("END PART", "END INSTANCE", "ASSEMBLY", "END ASSEMBLY"):
@@ -166,9 +166,7 @@ def load(path: Path) -> DeckAssembly:
         else:
             assembly.cards.append((card, ""))
     assembly.cards[:0] = [(card, name) for name, scope in assembly.instances.items() for card in scope.cards]
-    if flat and not assembly.instances:
-        return assembly
-    if not assembly.instances:
+    if parts and not assembly.instances:
         raise Refusal(f"deck '{path}' has parts but no *INSTANCE: write the deck with its assembly")
     return assembly
 
@@ -192,6 +190,8 @@ def _instance(card: Card, parts: dict[str, Scope], assembly: DeckAssembly) -> Sc
     if len(card.data) > 1:
         *axis, angle = card.floats(card.data[1], 7)
         start, direction = np.array(axis[:3]), np.array(axis[3:]) - np.array(axis[:3])
+        if not direction.any():
+            raise Refusal(f"{card.where} turns about two points at one place: give two points of the axis")
         turn = rotation(direction, math.radians(angle))
         shift = start + turn @ (shift - start)
     assembly.instances[name] = scope

@@ -19,7 +19,7 @@ GRAMMAR: dict[str, tuple[str, str]] = {
     "END ASSEMBLY": ("", ""),
     "INCLUDE": ("INPUT", ""),
     "SYSTEM": ("", "x, y, z, x of first axis, y, z; x in the plane, y, z;"),
-    "ORIENTATION": ("NAME, DEFINITION=COORDINATES, SYSTEM=RECT|ZRECT|CYL|SPH, (LOCAL DIRECTIONS)", ANY),
+    "ORIENTATION": ("NAME, DEFINITION=COORDINATES, SYSTEM=RECT|ZRECT|CYL|SPH, (LOCAL DIRECTIONS)", "...; axis, angle;"),
     "DISTRIBUTION": ("NAME, (LOCATION), (TABLE), INPUT", "element, x, y, z, x, y, z"),
     "MATERIAL": ("NAME", ""),
     "ELASTIC": ("TYPE=ISO|ORTHO|ENG|ANISO, (MODULI)", ANY),

@@ -141,6 +141,7 @@ BROKEN = {
     "too many nodes": ("*ELEMENT, TYPE=C3D4\n90, 1, 2, 3, 4, 5\n", "with more nodes than C3D4 has"),
     "a constant again": ("*MATERIAL, NAME=T\n*DENSITY\n1.\n*DENSITY\n2.\n", "gives another value of material 'T'"),
     "a set with a lost node": ("*NSET, NSET=E\n1, 999\n*BOUNDARY\nE, 1\n", "names 'E' with node 999"),
+    "a part again": ("*PART, NAME=P\n*END PART\n*PART, NAME=p\n", "has the name 'p' of another part"),
     "infinite": ("*NODE\n990, 1e400, 0., 0.\n", "expects a number, got '1e400'"),
     "the same element twice": ("*ELEMENT, TYPE=C3D8\n77, " + ", ".join(map(str, CELLS[0][:8])) + "\n",
         "such as 1 and 77"),
