@@ -17,10 +17,10 @@ from vtkmodules.vtkIOXML import vtkXMLPolyDataReader, vtkXMLUnstructuredGridRead
 
 from tests.helpers.command import refusal
 from tests.helpers.nodes_of_pairs import node_of_pair
-from tests.helpers.synthetic_result import LENGTH, WIDTH, block, result
+from tests.helpers.synthetic_result import block, result
 from tribodyn.reduction import foreign
 from tribodyn.workflows.export import formats, result_tables, vtk
-from tribodyn.workflows.pictures import exploded
+from tribodyn.workflows.report import charts
 from tribodyn.workflows.result import contact_states, faces, store
 from tribodyn.workflows.result.result import Result
 from tribodyn.workflows.run import pipeline
@@ -255,18 +255,16 @@ def test_a_face_whose_mesh_does_not_match_wears_as_the_pairs_around_its_nodes() 
     assert not displacement[np.setdiff1d(np.arange(len(part.points)), np.concatenate([other.nodes, patch.nodes]))].any()
 
 
-def test_bodies_are_drawn_apart_along_their_faces() -> None:
+def test_bodies_are_drawn_apart() -> None:
     synthetic = two_blocks(20)
-    part, patch = synthetic.part, synthetic.patch
+    part = synthetic.part
     assert part is not None
-    body, offsets = faces.bodies(part), exploded.explosion_offsets(synthetic)
-    between = offsets[body == body[patch.nodes[0]]][0] - offsets[body != body[patch.nodes[0]]][0]
-    np.testing.assert_allclose(between, [0, 0, exploded.EXPLOSION.gap * np.sqrt(patch.area.sum())], atol=1e-12)
-    tied = replace(synthetic, patch=replace(patch, faces=np.zeros((0, 4), int)))  # they touch, and no contact says so
-    offsets = exploded.explosion_offsets(tied)
-    between = offsets[body == body[patch.nodes[0]]][0] - offsets[body != body[patch.nodes[0]]][0]
-    np.testing.assert_allclose(between, [0, 0, exploded.EXPLOSION.gap * np.sqrt(LENGTH * WIDTH)], atol=1e-12)
-    assert not exploded.explosion_offsets(result()).any()
+    body, offsets = faces.bodies(part), charts.apart(part)
+    upper, lower = (body == number for number in body[[synthetic.patch.nodes[0], 0]])
+    distance = part.points[upper].mean(axis=0) - part.points[lower].mean(axis=0)
+    np.testing.assert_allclose(offsets[upper][0] - offsets[lower][0], distance, atol=1e-12)
+    assert result().part is not None
+    assert not charts.apart(result().part).any()
 
 
 def test_status_at_an_instant_is_that_of_the_force() -> None:

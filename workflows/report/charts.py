@@ -7,7 +7,6 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from tribodyn.hbm.quantity import StatedQuantity
-from tribodyn.workflows.pictures.exploded import explosion_offsets
 from tribodyn.workflows.pictures.figures import status_name
 from tribodyn.workflows.pictures.loop_plots import loop_size, pair_name
 from tribodyn.workflows.pictures.theme import CYCLE, GREY, INK, STATUS
@@ -17,7 +16,7 @@ from tribodyn.workflows.result.answers import histories_of
 from tribodyn.workflows.result.contact_states import ContactState, shown_states, state_of
 from tribodyn.workflows.result.faces import bodies, meetings_of, worn_off
 from tribodyn.workflows.result.number_format import axis_unit
-from tribodyn.workflows.result.result import Result
+from tribodyn.workflows.result.result import PartMesh, Result
 
 Chart = dict[str, Any]
 
@@ -149,7 +148,7 @@ def solid(result: Result) -> dict[str, Any] | None:
     data["camera"] = [plain(1.9 * towards / np.linalg.norm(towards)), plain(up)]
     if part is not None:
         nodes, triangles = _surface(result)
-        offset = explosion_offsets(result)
+        offset = apart(part)
         data["body"] = {
             "xyz": plain(1e3 * part.points[nodes].T, 6),
             "ijk": triangles.T.tolist(),
@@ -214,6 +213,13 @@ def _fields(result: Result, state: ContactState) -> dict[str, list[Any]]:
     if state.status is not None:
         fields["status"] = [int(bits) for bits in state.status]
     return fields
+
+
+def apart(part: PartMesh) -> np.ndarray:
+    """(n_node, 3) how far each node moves with its body, away from the middle of the mesh, to show bodies apart [m]."""
+    body = bodies(part)
+    middles = np.array([part.points[body == number].mean(axis=0) for number in range(body.max() + 1)])
+    return np.where(body[:, None] < 0, 0.0, (middles - part.points[body >= 0].mean(axis=0))[body])
 
 
 def _surface(result: Result) -> tuple[np.ndarray, np.ndarray]:
