@@ -62,6 +62,7 @@ app = cyclopts.App(
 for name, (place, meaning, *example) in WORDS.items():
     shown = {"help_epilogue": f"Example: tribodyn {example[0]}"} if example else {}  # a group has its own
     app.command(f"tribodyn.workflows.command.{place}", name=name, help=meaning, **shown)
+app.register_install_completion_command(help="Let the shell complete words, options and files.")
 
 
 def main(arguments: Sequence[str] | None = None) -> None:
