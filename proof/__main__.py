@@ -5,6 +5,7 @@ import os
 from collections.abc import Sequence
 from dataclasses import asdict
 from pathlib import Path
+from typing import Literal
 
 import cyclopts
 
@@ -62,7 +63,7 @@ def scoreboard(
     scenes: int = 40,
     seed: int = 1,
     seconds: float = 60.0,
-    wear: Flag = False,
+    kind: Literal["parts", "wear", "masses"] = "parts",
     modes: Flag = False,
     out: Path = Path("scoreboard"),
     as_json: Json = False,
@@ -79,8 +80,8 @@ def scoreboard(
         Of the draw.
     seconds
         Processor seconds that the run of a scene may take, and its reference again.
-    wear
-        Scenes that all wear, along their motion in time.
+    kind
+        Meshed parts, parts that all wear along their motion in time, or matrices of 1 to 20 masses.
     modes
         Their stress with 20, 40 and 80 modes beside nearly all of them instead, and whether its stated errors hold.
     out
@@ -95,7 +96,7 @@ def scoreboard(
         print(json.dumps(arrays, indent=2) if as_json else stress_modes.as_text(ladders))
         return
     make_room(out)
-    rows = board.run(scenes, seed, out, seconds, report_progress, wear)
+    rows = board.run(scenes, seed, out, seconds, report_progress, kind)
     table.write(rows, out)
     print(json.dumps([asdict(row) for row in rows], indent=2) if as_json else table.summary(rows))
     broken = sum(statement.violated for row in rows for statement in (*row.judged, *row.bound))

@@ -3,7 +3,6 @@
 It is not exact: 2.6 times the elements along every edge show 62 % of an error of first order and 85 % of one of second.
 """
 
-from contextlib import suppress
 from dataclasses import dataclass
 
 from proof.time_limit import TimeUp, processor_seconds
@@ -11,6 +10,7 @@ from tribodyn.hbm import threads
 from tribodyn.hbm.quantity import names_with_error, of_wear_with_error
 from tribodyn.refusal import Refusal, SolverFailure
 from tribodyn.workflows.errors import operating_states, refine
+from tribodyn.workflows.errors.refinement_limits import DEFAULT
 from tribodyn.workflows.run import modelling
 from tribodyn.workflows.run.progress import Progress
 from tribodyn.workflows.scene.scene_file import SceneFile
@@ -65,10 +65,12 @@ def solved(file: SceneFile, seconds: float, elements: float = FINER.elements) ->
 
 def finer(file: SceneFile, elements: float = FINER.elements) -> SceneFile:
     """The scene with everything finer; elements : along every edge, those of a given mesh are halved."""
-    with suppress(refine.NoMesh):
-        file = refine.mesh(file, elements)[0]
-    file = refine.modes(file, FINER.modes) or file
     top = max(max(file.scene.harmonics.kept) + FINER.harmonics, FINER.lowest)
+    try:
+        file = refine.mesh(file, elements)[0]
+    except refine.NoMesh:  # harmonics are all that can be finer: as many as the verdict takes in at most
+        top = DEFAULT.highest
+    file = refine.modes(file, FINER.modes) or file
     file = refine.wear(refine.harmonics(file, range(top + 1)), FINER.steps)
     tolerance, samples = 0.1 * file.scene.solver.tolerance, 2 * file.scene.harmonics.samples
     return file.changed(f"solver.tolerance={tolerance!r}", f"harmonics.samples={samples}")

@@ -64,23 +64,6 @@ class AmplitudeSlope:
         """x at a frequency, along the tangent."""
         return self.solution.state.x + (omega - self.omega) * self.dx
 
-    def between(self, other: AmplitudeSlope, omega: float) -> np.ndarray:
-        """x of the Hermite cubic between two points."""
-        t = (omega - self.omega) / (other.omega - self.omega)
-        return (1 - t) ** 2 * ((1 + 2 * t) * self.solution.state.x + (omega - self.omega) * self.dx) + t**2 * (
-            (3 - 2 * t) * other.solution.state.x + (omega - other.omega) * other.dx
-        )
-
-    def peak_before(self, other: AmplitudeSlope) -> float:
-        """Frequency of the peak between two points from both of which the curve rises towards the other [rad/s].
-
-        By the Hermite cubic of 1 / height^2, which is a parabola for one mode"""
-        h, ratio = other.omega - self.omega, (self.height / other.height) ** 2
-        a, b = -h * self.slope / self.height**2, -h * other.slope / other.height**2 * ratio
-        square, cubic = 3 * (ratio - 1) - 2 * a - b, 3 * (a + b - 2 * (ratio - 1))
-        root = np.sqrt(square**2 - a * cubic)
-        return self.omega + h * float(-a / (square + root) if square > 0 else (root - square) / cubic)
-
     def zero_with(self, other: AmplitudeSlope) -> float:
         """Where a straight line through the distances of two points vanishes [rad/s].
 

@@ -36,7 +36,6 @@ class CurvePeakRules:
 
     max_refined: int = 3  # maxima of a curve, the highest foreseen first
     trials: int = 40  # solves along the arc, after which the maximum is left as it is
-    shortest: float = 1e-6  # arc length between two points, of the first one, beside a kink where no slope vanishes
     tangent: float = 1e-8  # relative accuracy of tangents
 
 
@@ -71,11 +70,9 @@ def with_peaks(balance: HarmonicBalance, branch: Branch, site: AtPeak) -> Branch
         if candidate.turns:
             point = peak_on_arc(balance, branch, i, site)
         else:
-            three = [k for k in range(len(heights))[max(i - 1, 0) : i + 2] if k == i or k not in branch.folds]
-            solved_x = {float(branch.omega[k]): balance.shaped(branch.contact[k]) for k in three}
-            point = None
+            point, x = None, balance.shaped(branch.contact[i])
             with suppress(NoPeak):  # it still rises at the highest frequency that is modelled
-                point = site.solve_between(balance, float(branch.omega[i]), solved_x, candidate.low, candidate.high)
+                point = site.solve_between(balance, float(branch.omega[i]), x, candidate.low, candidate.high)
         if point is None or not point.solution.converged or point.amplitude < (1 - site.tolerance) * heights[i]:
             failed += [(max(candidate.height, heights[i]), i, SolveEnd.BESIDE_PEAK.say())]
             if point is not None and point.solution.outcome.kind is SolveEnd.UNLIMITED:
@@ -198,10 +195,9 @@ def peak_on_arc(balance: HarmonicBalance, branch: Branch, i: int, site: AtPeak) 
             return None
         ends = [middle, other] if rises else [other, middle]  # the amplitude rises at the first, falls at the second
         weight, best = [1.0, 1.0], min(ends, key=lambda end: end[1].miss)
-        first = metric.norm(ends[1][0].place - ends[0][0].place)
-        while best[1].miss > site.tolerance and spent < RULES.trials:
+        while spent < RULES.trials:
             segment = Segment(ends[0][0], ends[1][0], metric)
-            if segment.length <= RULES.shortest * first:
+            if segment.length <= 2 * site.tolerance * best[1].width:
                 break
             up, down = weight[0] * ends[0][1].slope, -weight[1] * ends[1][1].slope
             trial = solved(segment.at(float(np.clip(up / (up + down), 0.02, 0.98))), segment.mean_tangent)

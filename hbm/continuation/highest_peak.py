@@ -81,8 +81,8 @@ def highest(
         height = vertex(branch.omega[neighbours], heights[neighbours, output])[1]
         if best is not None and (1 + doubt) * height < best.amplitude:
             continue
-        solved_x = dict(zip(omega, map(balance.shaped, branch.contact[neighbours]), strict=True))
-        peak = replace(site, output=outputs[output]).solve_between(balance, omega[1], solved_x, min(omega), max(omega))
+        x, site = balance.shaped(branch.contact[point]), replace(site, output=outputs[output])
+        peak = site.solve_between(balance, omega[1], x, min(omega), max(omega))
         solves += peak.solves
         if not peak.solution.converged:
             continue

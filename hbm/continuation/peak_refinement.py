@@ -1,4 +1,4 @@
-"""Refine a resonance peak: the zero of the slope of the amplitude, by secants and Hermite cubics, one solve a step."""
+"""Refine a resonance peak by secants, one solve each, until the slope changes its sign within twice the resolution."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ class NoPeak(Refusal):
 class PeakRefinement:
     """The search from one frequency [rad/s].
 
-    known : x by frequency, of the start and of points that are solved already, no fold among them
+    x : of a solution there, or near it
     stride : first step [rad/s], by default the condition's; limits : of the frequency [rad/s]"""
 
     def __init__(
@@ -50,18 +50,18 @@ class PeakRefinement:
         condition: AtPeak,
         balance: HarmonicBalance,
         omega: float,
-        solved_x: dict[float, np.ndarray],
+        x: np.ndarray,
         stride: float | None = None,
         limits: tuple[float, float] = (0.0, np.inf),
     ):
-        self._condition, self._balance, self._solved_x = condition, balance, solved_x
+        self._condition, self._balance = condition, balance
         self._solves = 0
-        self._point = self._best = self._solve(omega, solved_x[omega])
+        self._point = self._best = self._solve(omega, x)
         self._previous: AmplitudeSlope | None = None
         self._bracket: tuple[AmplitudeSlope, AmplitudeSlope] | None = None  # the curve rises from both to the other
+        self._widths = [np.inf] * 3  # of the brackets so far [rad/s]
         self._share = 1.0  # of the way to the peak in the bracket, halved where a solve fails
         self._limits = max(1e-3 * omega, limits[0]), min(balance.omega_max, limits[1])
-        self._bounds = limits
         self._stride = condition.first_stride * self._point.width if stride is None else stride
         self._resolution = condition.resolution(self._point)
 
@@ -71,14 +71,10 @@ class PeakRefinement:
         Raises  NoPeak where the response still rises at the highest frequency that is modelled"""
         if not self._point.solution.converged:
             return self._result(self._point.solution)
-        while self._solves < MAX_SOLVES and abs(self._best.distance) > self._resolution:
-            target = self._target()
-            if target is None or abs(target - self._best.omega) <= self._resolution:
-                break
-            guess = self._bracket[0].between(self._bracket[1], target) if self._bracket else self._point.predict(target)
-            following = self._solve(target, self._solved_x.get(target, guess))
-            rises_on = target in self._solved_x and following.slope * self._point.slope > 0
-            if following.solution.converged and not rises_on:
+        while self._solves < MAX_SOLVES and (target := self._target()) is not None:
+            near = min(self._bracket or (self._point,), key=lambda point: abs(point.omega - target))
+            following = self._solve(target, near.predict(target))
+            if following.solution.converged:
                 self._advance(following)
             elif not self._shorten(target):
                 break
@@ -90,28 +86,28 @@ class PeakRefinement:
         return AmplitudeSlope.of(self._balance, solution, self._condition.output)
 
     def _target(self) -> float | None:
-        """Frequency of the next solve; None where the bracket is as narrow as the resolution."""
-        point, previous = self._point, self._previous
+        """Frequency of the next solve, at least the resolution away from others; None where it tells nothing more."""
+        point, previous, step = self._point, self._previous, self._resolution
         side = float(np.sign(point.slope))
-        bound = self._bounds[int(side > 0)]
         if self._bracket:
             low, high = sorted(end.omega for end in self._bracket)
-            if high - low <= self._resolution:  # as at a kink, where no slope vanishes
+            if high - low <= 2 * step:
                 return None
-            peak = self._bracket[0].peak_before(self._bracket[1])
+            peak = self._bracket[0].zero_with(self._bracket[1])
             if previous is not None and abs(previous.omega - point.omega) < high - low:  # the last two are closer
-                zero = previous.zero_with(point)
-                peak = zero if low < zero < high else peak
-            target = point.omega + self._share * (peak - point.omega)
-        elif previous is None and bound in self._solved_x:
-            target = bound
+                peak = previous.zero_with(point)
+            if not low < peak < high or self._widths[-1] > 0.5 * self._widths[-4]:  # a kink; brackets do not shrink
+                peak = 0.5 * (low + high)
+            target = point.omega + self._share * (float(np.clip(peak, low + step, high - step)) - point.omega)
         elif previous is None:
-            target = point.omega + (point.distance if abs(point.distance) < 20 * self._stride else side * self._stride)
+            distance = abs(point.distance)
+            target = point.omega + side * max(distance if distance < 20 * self._stride else self._stride, step)
         else:  # extrapolate the slope, never further than a few strides and always uphill
             reach = abs(point.omega - previous.omega)
             zero = (previous.zero_with(point) - point.omega) * side
-            target = point.omega + side * (min(zero, 8 * reach) if zero > 0 else 3 * reach)
-        return float(np.clip(target, *self._limits))
+            target = point.omega + side * (min(max(zero, step), 8 * reach) if zero > 0 else 3 * reach)
+        target = float(np.clip(target, *self._limits))
+        return None if abs(target - point.omega) < 0.5 * step else target
 
     def _advance(self, following: AmplitudeSlope) -> None:
         """Continue from a solved point."""
@@ -121,24 +117,19 @@ class PeakRefinement:
             self._bracket = (following, high) if following.slope * low.slope > 0 else (low, following)
         elif following.slope * self._point.slope <= 0:
             self._bracket = self._point, following
+        if self._bracket:
+            self._widths.append(abs(self._bracket[0].omega - self._bracket[1].omega))
         self._previous, self._point = self._point, following
-        if following.miss <= self._best.miss:
-            self._best, self._resolution = following, self._condition.resolution(following)
+        self._best = min(self._bracket or (self._best, following), key=lambda point: abs(point.distance))
+        self._resolution = self._condition.resolution(self._best)
 
     def _shorten(self, target: float) -> bool:
         """Shorten the next step after a solve that failed or lies on another branch; False where it is short enough."""
-        self._solved_x = {}
         if self._bracket:
             self._share *= 0.5
-            return self._miss > self._condition.near_peak
+            return self._share * self._widths[-1] > self._condition.near_peak * self._best.width
         self._stride, self._previous = 0.25 * min(self._stride, abs(target - self._point.omega)), None
         return self._stride >= self._resolution
-
-    @property
-    def _miss(self) -> float:
-        """Distance of the best point to the peak in widths, or the width of the bracket."""
-        between = abs(self._bracket[0].omega - self._bracket[1].omega) if self._bracket else np.inf
-        return min(self._best.miss, between / self._best.width)
 
     def _checked(self) -> Solution:
         """The best point, with the outcome of the search."""
@@ -151,7 +142,7 @@ class PeakRefinement:
         hertz, rises = best.omega / (2 * np.pi), "rises" if best.slope > 0 else "falls"
         if best.omega > self._condition.max_growth * best.width and best.miss > self._condition.tolerance:
             return replace(best.solution, outcome=SolveEnd.UNLIMITED.say(f" {hertz:.5g} Hz"))
-        if self._miss <= self._condition.near_peak:  # sampled forces have kinks, where the slope jumps
+        if min(best.miss, self._widths[-1] / best.width) <= self._condition.near_peak:  # sampled forces have kinks
             return best.solution
         detail = f" {self._solves} solves: the curve ends at {hertz:.5g} Hz, where it still {rises}"
         return replace(best.solution, outcome=SolveEnd.SITE_NOT_FOUND.say(detail))

@@ -114,13 +114,13 @@ class AtPeak:
     @single
     def solve_near(self, balance: HarmonicBalance, omega: float, x: np.ndarray) -> OperatingPoint:
         """Refine from a neighbouring peak."""
-        return PeakRefinement(self, balance, omega, {omega: x}).run()
+        return PeakRefinement(self, balance, omega, x).run()
 
     def solve_between(
-        self, balance: HarmonicBalance, omega: float, solved_x: dict[float, np.ndarray], low: float, high: float
+        self, balance: HarmonicBalance, omega: float, x: np.ndarray, low: float, high: float
     ) -> OperatingPoint:
-        """Refine a maximum of a curve between two frequencies [rad/s]; known : x by frequency, of no fold."""
-        return PeakRefinement(self, balance, omega, solved_x, 0.25 * (high - low), (low, high)).run()
+        """Refine a maximum of a curve between two frequencies [rad/s]."""
+        return PeakRefinement(self, balance, omega, x, 0.25 * (high - low), (low, high)).run()
 
     @single
     def dominant_peak(self, balance: HarmonicBalance, point: OperatingPoint) -> DominantPeak:
@@ -240,8 +240,8 @@ class AtPeak:
             width = float(np.ptp(neighbours)) / 2
             reach, omega = self.outside_reach * width, float(branch.omega[row])
             limits = float(neighbours.min()) - reach, float(neighbours.max()) + reach
-            solved_x = {omega: balance.shaped(branch.contact[row])}
-            peak = PeakRefinement(self, balance, omega, solved_x, 0.5 * width, limits).run()
+            x = balance.shaped(branch.contact[row])
+            peak = PeakRefinement(self, balance, omega, x, 0.5 * width, limits).run()
             solves += peak.solves
             if peak.solution.outcome.kind in SOLVED:  # no lower one is taken for a resonance that nothing limits
                 break

@@ -64,7 +64,7 @@ class Row:
     """One scene.
 
     outcome : "measured", or what ended it; seconds : of the processor, of run, verdict and reference
-    wearing : whether it was drawn as one of scenes that all wear"""
+    kind : that it was drawn as, see `scoreboard_scenes.KINDS`"""
 
     number: int
     seed: int
@@ -77,7 +77,7 @@ class Row:
     changes: tuple[dict[str, Any], ...]
     seconds: tuple[float, float, float]
     ratio: float | None = None
-    wearing: bool = False
+    kind: str = "parts"
 
     def record(self) -> str:
         """One line of JSON."""
@@ -100,27 +100,21 @@ def rows_in(folder: Path) -> list[Row]:
     return [row_of(line) for line in lines if line.endswith("}")]
 
 
-def _torn(folder: Path) -> bool:
-    """Whether the last row was not written whole."""
-    text = (folder / ROWS).read_text(encoding="utf-8")
-    return bool(text) and not text.endswith("\n")
-
-
 def run(
-    scenes: int, seed: int, folder: Path, seconds: float, say: Callable[[str], None], wearing: bool = False
+    scenes: int, seed: int, folder: Path, seconds: float, say: Callable[[str], None], kind: str = "parts"
 ) -> list[Row]:
     """Draw, run, judge and check scenes, those that `folder` holds of this seed left out; all rows of the seed.
 
     scenes : how many; 0: none, only what `folder` holds
     seconds : of the processor, that the run of a scene may take, and its reference again
-    wearing : scenes that all wear, of which no error bound is asked for"""
+    kind : of scenes, see `scoreboard_scenes.KINDS`; an error bound is asked for of some parts"""
     folder.mkdir(parents=True, exist_ok=True)
-    rows = [row for row in rows_in(folder) if (row.seed, row.wearing) == (seed, wearing)]
+    rows = [row for row in rows_in(folder) if (row.seed, row.kind) == (seed, kind)]
     done = {row.number for row in rows}
     for number in (n for n in range(scenes) if n not in done):
-        row = measured(number, seed, seconds, wearing)
+        row = measured(number, seed, seconds, kind)
         with (folder / ROWS).open("a", encoding="utf-8") as file:
-            file.write("\n" * _torn(folder) + row.record() + "\n")
+            file.write("\n" + row.record() + "\n")  # the last one may not have been written whole
         rows.append(row)
         violated = ", ".join(entry.quantity for entry in (*row.judged, *row.bound) if entry.violated)
         spent = "/".join(f"{entry:.0f}" for entry in row.seconds)
@@ -128,13 +122,13 @@ def run(
     return sorted((row for row in rows if not scenes or row.number < scenes), key=lambda row: row.number)
 
 
-def measured(number: int, seed: int, seconds: float, wearing: bool = False) -> Row:
+def measured(number: int, seed: int, seconds: float, kind: str = "parts") -> Row:
     """The row of one scene."""
-    row = Row(number, seed, "", "", 0, 0, (), (), (), (0.0, 0.0, 0.0), wearing=wearing)
+    row = Row(number, seed, "", "", 0, 0, (), (), (), (0.0, 0.0, 0.0), kind=kind)
     with TemporaryDirectory() as place:
         folder = Path(place)
         try:
-            drawn = draw(number, seed, folder, wearing)
+            drawn = draw(number, seed, folder, kind)
         except (ValueError, RuntimeError, np.linalg.LinAlgError) as refusal:
             return replace(row, outcome=f"not drawn: {refusal}")
         row = replace(row, family=drawn.family)
@@ -157,7 +151,7 @@ def measured(number: int, seed: int, seconds: float, wearing: bool = False) -> R
             n_pair=model.balance.contact.n_pair,
             harmonics=max(result.harmonics),
             judged=tuple(_judged(name, stated, truth) for name in names_with_error() if name in stated.statements),
-            bound=_bound(file, seconds) if number % BOUNDED == 1 and not wearing else (),
+            bound=_bound(file, seconds) if number % BOUNDED == 1 and kind == "parts" else (),
             changes=tuple(asdict(change) for change in stated.changes),
             ratio=stated.ratio,
             seconds=(ran, stated.seconds, referred),

@@ -7,6 +7,7 @@ import json
 import shutil
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -14,6 +15,7 @@ import numpy as np
 import scipy.linalg as sla
 
 from proof import bracket
+from tests.helpers.matrix_scene import masses
 from tribodyn.hbm.balance import HarmonicBalance
 from tribodyn.reduction.linear import stuck_stiffness
 from tribodyn.workflows.run import modelling, references, settings
@@ -24,7 +26,7 @@ Table = dict[str, Any]
 WIDEST = 4.0  # highest over lowest frequency of a response
 STEEL = {"young": "210 GPa", "density": "7860 kg/m3", "poisson": 0.3}
 MODES = 6  # stuck modes that the resonance is looked for in
-WORN = 0.5  # share of the scenes that are worn
+WORN = {"parts": 0.5, "wear": 1.0, "masses": 0.0}  # share of the scenes that are worn
 # logarithm of the tangential force of the stuck contact over what friction can carry; with little of it wear fades
 # out before the contact is lost
 DRIVE, WEARING = (-0.2, 0.8), (0.4, 1.0)
@@ -53,25 +55,27 @@ class Drawn:
         return parse(self.text, f"{self.family}_{self.number}.toml", overrides, folder)
 
 
-def draw(number: int, seed: int, folder: Path, wearing: bool = False) -> Drawn:
-    """Scene `number` of a seed; families come in turn.
+def draw(number: int, seed: int, folder: Path, kind: str = "parts") -> Drawn:
+    """Scene `number` of a seed; the families of a kind come in turn.
 
-    wearing : all are worn, along their motion in time, which no wheel is; else some, along that of the balance
+    kind : see `KINDS`; of "parts" some are worn, along the motion of the balance
     Raises  ValueError, RuntimeError where it has no resonance"""
     rng = np.random.default_rng([seed, number])
-    families = [name for name in FAMILIES if not (wearing and name == "wheel")]
-    family = families[number % len(families)]
+    family, wearing = KINDS[kind][number % len(KINDS[kind])], kind == "wear"
     tables = FAMILIES[family](rng)
     shutil.copy(bracket.__file__, folder)
     table: Table = {"scene": {"title": f"{family} {number} of seed {seed}"}} | tables
     table |= _common(rng, HIGHEST.get(family, TOPS[-1]))
-    table |= {"materials": {"steel": STEEL}} if "bodies" in table else {"material": STEEL}
-    if "wheel" not in table:
+    if family == "masses":
+        np.savez(folder / table["model"]["file"], **table.pop("matrices"))
+    else:
+        table |= {"materials": {"steel": STEEL}} if "bodies" in table else {"material": STEEL}
+    if family not in ("wheel", "masses"):
         table["reduction"] = {"modes": int(rng.integers(5, 16))}
     guess: Table = {"frequency": [1.0, 1e5], "points": 10}
     text = as_toml(table | {"response": table["response"] | guess})
     balance = modelling.build(parse(text, "drawn.toml", (), folder), Progress()).balance
-    worn, at = bool(rng.uniform() < WORN) or wearing, float(rng.uniform(*SPREADS[int(rng.integers(len(SPREADS)))]))
+    worn, at = bool(rng.uniform() < WORN[kind]), float(rng.uniform(*SPREADS[int(rng.integers(len(SPREADS)))]))
     drive = float(10 ** rng.uniform(*(WEARING if worn else DRIVE)))
     low, high, place, force = _operating_range(balance, drive, at if worn else None)
     table["response"] |= {"frequency": [low, high], "points": int(rng.choice([30, 50]))}
@@ -232,7 +236,9 @@ def _rig(rng: np.random.Generator) -> Table:
 
 FAMILIES: dict[str, Callable[[np.random.Generator], Table]] = {
     "beam": _beam, "plate": _plate, "arm": _arm, "bracket": _bracket, "wheel": _wheel, "rig": _rig,
+    "masses": partial(masses, contact=_contact),
 }  # fmt: skip
+KINDS = {"parts": tuple(FAMILIES)[:-1], "wear": ("beam", "plate", "arm", "bracket", "rig"), "masses": ("masses",)}
 
 
 def _operating_range(balance: HarmonicBalance, drive: float, at: float | None) -> tuple[float, float, float, float]:
@@ -242,7 +248,7 @@ def _operating_range(balance: HarmonicBalance, drive: float, at: float | None) -
     at : the frequency over the resonance of the free part; None: the highest resonance of the stuck one"""
     system, b = balance.model.at_harmonic(1)
     free, stuck_modes = (
-        np.sqrt(np.abs(sla.eigh(k, system.mass, eigvals_only=True, subset_by_index=(0, MODES - 1))))
+        np.sqrt(np.abs(sla.eigh(k, system.mass, eigvals_only=True, subset_by_index=(0, min(MODES, len(k)) - 1))))
         for k in (system.stiffness, stuck_stiffness(system.stiffness, b, balance.contact.stiffness))
     )
     curves = references.linear_references(

@@ -2,14 +2,14 @@
 
 import csv
 from collections import Counter
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 
 import matplotlib as mpl
 import numpy as np
 from matplotlib.figure import Figure
 
-from proof.unseen_scenes.scoreboard import ROUNDING, Judged, Row
+from proof.unseen_scenes.scoreboard import ROUNDING, Row
 from tribodyn.hbm.quantity import names_with_error, quantity_named
 from tribodyn.workflows.pictures.theme import BLUE, RED, STYLE
 
@@ -55,16 +55,12 @@ def summary(rows: Sequence[Row]) -> str:
         lines.append(f"{name:15} {counts[0]:8d} {counts[1]:8d} {median:>19} {unsaid[0]:10d} {unsaid[1]:9d}")
     bounds = [statement for row in rows for statement in row.bound if statement.counted]
     lines.append(f"--accuracy: {len(bounds)} bounds, {sum(statement.violated for statement in bounds)} violated")
-    for row, statement in _violated(rows):
+    for row, statement in ((r, each) for r in rows for each in (*r.judged, *r.bound) if each.violated):
         name = quantity_named(statement.quantity).label
         lines.append(
             f"violated: {row.family} {row.number}, {name}: stated {statement.error:.2g}, true {statement.true:.2g}"
         )
     return "\n".join(lines)
-
-
-def _violated(rows: Sequence[Row]) -> Iterator[tuple[Row, Judged]]:
-    yield from ((row, statement) for row in rows for statement in (*row.judged, *row.bound) if statement.violated)
 
 
 def write(rows: Sequence[Row], folder: Path) -> None:

@@ -1,6 +1,8 @@
 """A small scene made of matrices, with its files."""
 
+from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -48,3 +50,26 @@ def matrix_folder(tmp_path: Path) -> Path:
     )  # fmt: skip
     (tmp_path / "own.toml").write_text(SCENE)
     return tmp_path
+
+
+def masses(rng: np.random.Generator, contact: Callable[..., dict[str, Any]]) -> dict[str, Any]:
+    """Matrices of masses, each on struts to the one before; one to four of them rub on the ground, along x and y."""
+    n = int(rng.integers(1, 21))
+    stiffness = np.zeros((3 * n, 3 * n))
+    for i in range(n):
+        ends = (np.arange(n) == i).astype(float) - (np.arange(n) == i - 1)
+        struts = np.kron(ends, np.linalg.qr(rng.normal(size=(3, 3)))[0])
+        stiffness += struts.T * 10 ** rng.uniform(5.5, 6.5, 3) @ struts
+    pairs = [3 * int(i) for i in rng.choice(n, min(n, int(rng.integers(1, 5))), replace=False)]
+    law = {key: value for key, value in contact(rng, 3e6, False).items() if key not in ("t1", "vertices_only")}
+    shaken = {"dofs": [3 * int(rng.integers(n))]}
+    return {
+        "model": {"file": "part.npz"},
+        "matrices": {"M": np.diag(np.repeat(rng.uniform(0.2, 2.0, n), 3)), "K": stiffness},
+        "contact": {"dofs": [[i, i + 1, i + 2] for i in pairs], "area": 1e-4, **law},
+        "loads": {
+            "static": {"press": {"dofs": [i + 2 for i in pairs], "value": float(10 ** rng.uniform(2, 4))}},
+            "harmonic": {"shake": shaken | {"value": 1.0}},
+        },
+        "response": dict(shaken),
+    }

@@ -44,7 +44,7 @@ def elasticity_anew(worn, share, problem_of, guess):
     """Central difference of runs whose steps keep their shares of a life that ends at the same share of the preload.
 
     problem_of : factor on the number -> problem; guess : the elasticity of the life, near it"""
-    end, h = int(np.flatnonzero(worn.preload < share * worn.preload[0])[0]), 3e-5
+    end, h = int(np.flatnonzero(worn.preload < share * worn.preload[0])[0]), 1e-4
     equal = problem_of(1.0)
     values, remaining = again(equal, worn, end, 1.0)
     slope = (again(equal, worn, end, 1 + h)[1] - remaining) / h

@@ -82,7 +82,7 @@ def test_the_scene_is_the_same_as_the_documented_python(folder: Path, monkeypatc
     common = np.isin(theirs.omega, ours.omega)  # the scene's curve has its solved peaks, too
     assert theirs.amplitude("response")[common] == pytest.approx(ours.amplitude("tip"), rel=1e-6)
     assert theirs.amplitude("response").max() >= ours.amplitude("tip").max()
-    assert result.wear.cycles == pytest.approx(names["history"].cycles, rel=1e-5)
+    assert result.wear.cycles == pytest.approx(names["history"].cycles, rel=3e-5)  # within the resolution of peaks
     assert result.wear.depth == pytest.approx(names["history"].depth, rel=1e-5)
 
 

@@ -193,19 +193,6 @@ def test_a_peak_is_looked_for_where_the_line_through_two_distances_vanishes() ->
     assert AmplitudeSlope.zero_with(rises, falls) == pytest.approx(2.0)
 
 
-def test_the_peak_of_one_mode_is_where_the_slopes_at_two_points_tell() -> None:
-    """Of y = R / (p - omega) with p = 3 + 0.5 i; and x between them is a cubic, here w^3 - 2 w."""
-    solved = []
-    for w in (1.0, 4.5):
-        level = (w - 3.0) ** 2 + 0.25
-        x = SimpleNamespace(state=SimpleNamespace(x=w**3 - 2 * w))
-        of = {"omega": w, "height": 7 / np.sqrt(level), "slope": -49 * 2 * (w - 3.0) / level**2}
-        solved.append(SimpleNamespace(**of, dx=3 * w**2 - 2, solution=x))
-    for item, other in (solved, solved[::-1]):
-        assert AmplitudeSlope.peak_before(item, other) == pytest.approx(3.0)  # type: ignore[arg-type]
-        assert AmplitudeSlope.between(item, other, 2.5) == pytest.approx(2.5**3 - 5.0)  # type: ignore[arg-type]
-
-
 @pytest.mark.parametrize("transitions", ["located", "sampled"])
 def test_forces_over_gaps_are_those_of_a_plain_march(transitions: str) -> None:
     body = lattice(2, 2)

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 import tribodyn as td
+from tribodyn.workflows.report import text
 from tribodyn.workflows.result.verdict import Status
 from tribodyn.workflows.scene.scene_file import parse
 
@@ -143,3 +144,12 @@ def test_a_stated_number_is_right(scene: dict[str, object], truth: dict[str, flo
         item = verdict.statements[name]
         assert not item.stated or abs((item.value or 0.0) / right - 1) < (item.error or 0.0), name
         assert item.stated or scene.get("force") is None
+
+
+def test_a_balance_that_negative_damping_feeds_is_no_motion(tmp_path: Path) -> None:
+    """It grows by 0.63 of itself a second, too slowly to be seen in time; friction takes little of what feeds it."""
+    law = 'components = ["t1"]\nlaw = "jenkins_constant"\ntangential_stiffness = 1e3\nfriction = 0.4\nnormal_load = 0.1'
+    result = ran(tmp_path, -0.01, law, 2.5e-3, [8.0, 13.0], [0, 1, 3])
+    assert result.verdict is not None
+    assert not any(statement.stated for statement in result.verdict.statements.values())
+    assert "; the motion in time is another one, see errors" in "\n".join(text.brief(result))

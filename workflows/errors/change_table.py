@@ -12,6 +12,7 @@ import numpy as np
 
 from tribodyn.hbm import newton
 from tribodyn.hbm.balance import HarmonicBalance
+from tribodyn.hbm.continuation.operating_point import AtFrequency
 from tribodyn.hbm.newton import NewtonOptions
 from tribodyn.hbm.quantity import CycleQuantity, ErrorKind, names_with_error, of_wear_with_error
 from tribodyn.hbm.wear import wear_rule
@@ -24,7 +25,7 @@ from tribodyn.workflows.errors.refinement_limits import DEFAULT, RefinementLimit
 from tribodyn.workflows.result.answers import worn_contact
 from tribodyn.workflows.result.result import Result
 from tribodyn.workflows.result.verdict import MeasuredChange, Refinement
-from tribodyn.workflows.run import modelling, wear_run
+from tribodyn.workflows.run import modelling, settings, wear_run
 from tribodyn.workflows.run.modelling import Model
 from tribodyn.workflows.run.progress import Progress
 from tribodyn.workflows.scene.matrix_scene import MatrixScene
@@ -70,19 +71,19 @@ class ChangeTable:
         """Rows of a quantity."""
         return [row for row in self.rows if row.quantity == quantity]
 
-    def take_motion(self, values: Values, scatter: Values, refined: Values | None = None, text: str = "") -> None:
+    def take_motion(self, values: Values, scatter: Values, mesh: tuple[Refinement, Values, str] | None = None) -> None:
         """Put values in time in place of those of the balance, whose harmonics and samples then do not matter.
 
-        scatter : relative, of means and time steps; refined : values in time on another mesh, None where not measured
-        """
+        scatter : relative, of means and time steps
+        mesh : row, values in time on another mesh, and which; None where not measured"""
         balance = {Refinement.HARMONICS, Refinement.SAMPLES}
-        balance |= {Refinement.MODES, Refinement.MESH} if refined else set()
+        balance |= {Refinement.MODES, Refinement.MESH} if mesh else set()
         self.rows = [row for row in self.rows if row.quantity not in values or row.refinement not in balance]
         self.in_time = values
         for name, relative in scatter.items():
             self.estimate(Refinement.MOTION, [name], relative, "means in time and their steps")
-        if refined:
-            self.add(Refinement.COMBINED, values, refined, text)
+        if mesh:
+            self.add(mesh[0], values, *mesh[1:])
 
     def add(
         self, refinement: Refinement, values: Values, refined: Values, text: str, remaining: Values | None = None
@@ -166,6 +167,9 @@ class ChangeTable:
         error = sampling_error(first.balance, first.point.state.omega, first.point.state.x)
         sampled = [name for name in first.values if name != operating_states.place_of_peak()]
         self.estimate(Refinement.SAMPLES, sampled, error, "estimate: located transitions")
+        if not isinstance(first.site, AtFrequency):
+            for name, relative in operating_states.changes_near_peak(first, settings.peak_of(file.scene)).items():
+                self.estimate(Refinement.PLACE, [name], relative, "as far from it as its search may end")
         if file.scene.wear is None or worn is None or not self.result.wear_steps:
             return
         rule = wear_rule.load(file.scene.wear.rule_name).Rule
@@ -240,7 +244,7 @@ class ChangeTable:
             self.add(Refinement.COMBINED, values, operating_states.values_through(worn), text)
             self.worn_ratio = None if no_mesh else ratio
             if self.in_time:
-                self.take_motion(self.in_time, {}, operating_states.values_before(worn), text)
+                self.take_motion(self.in_time, {}, (Refinement.COMBINED, operating_states.values_before(worn), text))
 
 
 def measure_changes(

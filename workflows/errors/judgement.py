@@ -5,9 +5,12 @@ safety x change by harmonics and samples: amounts are added, so that none cancel
 How often that holds on scenes that nobody has tuned is measured by ./tribodyn prove scoreboard."""
 
 from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import replace
 from math import log
 from time import process_time
+
+from scipy.linalg import eigvalsh, norm
 
 from tribodyn.hbm.continuation.operating_point import AtFrequency
 from tribodyn.hbm.fatigue import largest_von_mises
@@ -22,9 +25,12 @@ from tribodyn.hbm.quantity import (
     quantities_of,
     with_error,
 )
+from tribodyn.hbm.stability.exponents import CLEAR, stability
+from tribodyn.hbm.stability.floquet import grows_in_time
 from tribodyn.refusal import Refusal, SolverFailure
 from tribodyn.workflows.errors import time_comparison
 from tribodyn.workflows.errors.change_table import ChangeTable, measure_changes
+from tribodyn.workflows.errors.ladders import ROUNDING
 from tribodyn.workflows.errors.operating_states import OperatingState, place_of_peak, relative_change
 from tribodyn.workflows.errors.refinement_limits import DEFAULT, RefinementLimits
 from tribodyn.workflows.errors.time_comparison import MotionDifference
@@ -52,7 +58,8 @@ def judge(
     comparison: MotionDifference | str | None = None
     with progress.stage("time integration"):
         if table.first is not None and not table.in_time:
-            if time_comparison.is_checked(table.first, file.scene.verdict.in_time, limits):
+            comparison = _growth(table.first)
+            if comparison is None and time_comparison.is_checked(table.first, file.scene.verdict.in_time, limits):
                 comparison = _compare(table, table.first)
             if comparison is not None and result.wear_steps and file.scene.wear is not None:
                 table.rows += time_comparison.changes_along_wear(file, model.balance, result, table.wear_harmonics)
@@ -62,6 +69,17 @@ def judge(
     quantities = (*cycle_quantities, *of_wear_with_error(worn_contact(result)), *of_curve)
     statements = {quantity.name: _statement(quantity, table, comparison) for quantity in quantities}
     return Verdict(statements, tuple(table.rows), table.ratio, process_time() - clock, table.worn_ratio)
+
+
+def _growth(state: OperatingState) -> str | None:
+    """Why a steady state that a negative damping feeds is left, which takes long in time; else None."""
+    damping = state.balance.model.at_harmonic(1)[0].damping
+    if damping is not None and eigvalsh(damping + damping.conj().T)[0] < -ROUNDING * norm(damping):
+        with suppress(Refusal):
+            solved, growth = state.point.state, stability(state.balance, state.point.state).exponents[0].real
+            if growth > CLEAR * solved.omega or (growth > 0 and grows_in_time(state.balance, solved)):
+                return f"negative damping feeds a vibration that grows by {growth:.2g} 1/s"
+    return None
 
 
 def _compare(table: ChangeTable, state: OperatingState) -> MotionDifference | str | None:
@@ -79,7 +97,11 @@ def _compare(table: ChangeTable, state: OperatingState) -> MotionDifference | st
             coarse, comparison = comparison.values, time_comparison.compare(state, 2, shift)
             if at_frequency and comparison.contradicts(totals):
                 steps = {name: relative_change(coarse[name], x) for name, x in comparison.values.items()}
-                table.take_motion(comparison.values, {name: x + comparison.error for name, x in steps.items()})
+                scatter, mesh = {name: x + comparison.error for name, x in steps.items()}, None
+                if table.last is not None and time_comparison.is_checked(table.last, None, limits):
+                    with suppress(Refusal, SolverFailure):
+                        mesh = Refinement.MESH, time_comparison.compare(table.last, 2).values, "in time"
+                table.take_motion(comparison.values, scatter, mesh)
     except Refusal:
         return None
     except SolverFailure as failure:
@@ -134,8 +156,8 @@ def _statement(quantity: StatedQuantity, table: ChangeTable, comparison: MotionD
     elif isinstance(comparison, MotionDifference) and not wears:
         names = comparison.differences if not sampled else (quantity.name,)  # no peak where the motion is another one
         if difference := comparison.contradicts({name: error for name in names}):
-            reason = f"of the contact before wear, by {difference:.1%}"
-            return Statement(value, error, dominated, comparison.status, reason)
+            status = Status.UNSTABLE if comparison.spread > 0 else Status.CONTRADICTED
+            return Statement(value, error, dominated, status, f"of the contact before wear, by {difference:.1%}")
     if singularity := unbounded(quantity, table):
         return Statement(value, None, dominated, Status.UNBOUNDED, singularity)
     if error is None:
@@ -165,7 +187,7 @@ def total_error(
     chance = least if size(Refinement.MOTION) else 0.0  # then means and steps scatter
     change = max(size(Refinement.COMBINED, Refinement.MESH, Refinement.MODES), chance)
     truncation = limits.safety * size(Refinement.HARMONICS, Refinement.SAMPLES, Refinement.SPRINGS)
-    return max(limits.total(change, ratio), least) + truncation + size(Refinement.OTHER_MOTION), ""
+    return max(limits.total(change, ratio), least) + truncation + size(Refinement.OTHER_MOTION, Refinement.PLACE), ""
 
 
 def unbounded(quantity: StatedQuantity, table: ChangeTable, least: float = 0.02) -> str:

@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from tribodyn.hbm import newton
 from tribodyn.hbm.balance import HarmonicBalance, State
 from tribodyn.hbm.continuation import harmonic_choice
 from tribodyn.hbm.continuation.branch import Branch
@@ -165,6 +166,18 @@ def require_solved(state: OperatingState) -> OperatingState:
     if not state.point.solution.converged:
         raise SolverFailure(str(state.point.solution.outcome))
     return state
+
+
+def changes_near_peak(state: OperatingState, site: AtPeak) -> Values:
+    """Relative changes of the quantities of a peak to both ends of where its search may end; the larger ones."""
+    balance, peak, values = state.balance, state.point.state, state.values
+    changes, reach = dict.fromkeys(values, 0.0), 2 * site.correction(balance, peak).accuracy
+    for omega in (peak.omega - reach, peak.omega + reach):
+        solution = newton.solve(balance, omega, peak.x, site.newton)
+        if solution.converged:
+            for name, value in values_of(balance, solution.state).items():
+                changes[name] = max(changes[name], relative_change(value, values[name]))
+    return changes
 
 
 def relative_change(value: float, refined: float) -> float:

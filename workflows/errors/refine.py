@@ -34,18 +34,16 @@ def overrides_of(file: SceneFile, refinement: str, factor: float) -> tuple[str, 
     refinement : a Refinement; factor : on elements along every edge and on modes"""
     top = max(file.scene.harmonics.kept, default=1)
     finer_wear = partial(wear, file, WEAR_FACTOR)  # its tolerance decides on the scatter of means in time too
-    refinements: dict[str, Callable[[], SceneFile | None]] = {
+    refinements: dict[str, Callable[[], SceneFile | None]] = {  # of the others there is nothing to refine
         Refinement.HARMONICS: lambda: harmonics(file, range(top + 3)),
         Refinement.MESH: lambda: mesh(file, factor)[0],
         Refinement.MODES: lambda: modes(file, factor),
         Refinement.SAMPLES: lambda: file.changed(f"harmonics.samples={2 * file.scene.harmonics.samples}"),
         Refinement.WEAR_STEPS: finer_wear,
         Refinement.MOTION: finer_wear,
-        Refinement.OTHER_MOTION: lambda: None,
-        Refinement.SPRINGS: lambda: None,
     }
     try:
-        finer = refinements[refinement]()
+        finer = refinements.get(refinement, lambda: None)()
     except NoMesh:
         return ()
     return () if finer is None else finer.overrides[len(file.overrides) :]

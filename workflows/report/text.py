@@ -97,6 +97,9 @@ def _cycle_lines(result: Result, answers: Sequence[Answer]) -> list[str]:
         if (order := order_of_line(result)) is not None and frequency.value is not None:
             values.insert(1, f"{60 * frequency.value / order:.{frequency.quantity.digits}g} rpm")
         lines.append(f"{word:{WIDTH}}{', '.join(values)}{suffix.get(moment, '')}")
+        states = {answer.error.status for answer in cycle_answers if answer.error is not None}
+        if states and states <= {Status.UNSTABLE, Status.CONTRADICTED, Status.UNSETTLED}:
+            lines[-1] += "; the motion in time is another one, see errors"
     return lines
 
 

@@ -14,6 +14,7 @@ class Refinement(StrEnum):
     HARMONICS = "harmonics"
     SAMPLES = "samples"
     SPRINGS = "contact springs"
+    PLACE = "place of the peak"
     WEAR_STEPS = "wear steps"
     MOTION = "statistics of the motion"
     OTHER_MOTION = "another motion"
