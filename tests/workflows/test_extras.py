@@ -19,7 +19,6 @@ SIGNALS = "SIGKILL SIGPIPE SIGHUP SIGALRM SIGUSR1 alarm setitimer pause"
 POSIX = {"os": OF_OS.split(), "signal": SIGNALS.split()}
 MODULES = {"fcntl", "resource", "pwd", "grp", "termios", "tty", "pty", "posix"}
 GUARDS = ("sys.platform", "hasattr(", "getattr(", '"SC_PAGE_SIZE"')
-OF_LINUX = {"_works_in_child", "_run_in_silence"}  # called where sys.platform is linux
 SOLVER_ALONE = """
 import contextlib, importlib, importlib.abc, io, json, os, pkgutil, signal, sys
 import cyclopts, filelock, h5py, multiprocessing.context, numba, numpy, pydantic, rich, scipy.linalg, subprocess
@@ -112,7 +111,7 @@ def unguarded(text: str) -> list[str]:
     words = []
     for function in functions:
         source = ast.get_source_segment(text, function) or ""
-        if function.name not in OF_LINUX and not any(guard in source for guard in GUARDS):
+        if not any(guard in source for guard in GUARDS):
             words += _posix_words(function)
         function.body = [ast.Pass()]
     return words + _posix_words(tree)

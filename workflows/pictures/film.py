@@ -1,21 +1,18 @@
 """Films of a result: its contact over wear, and its part and contact over one cycle of a state.
 
-Camera, factors of exaggeration and colour scales are the same in all images of a film. MP4 is written by the encoder
-that comes with imageio-ffmpeg, GIF by Pillow."""
+Camera, factors of exaggeration and colour scales are the same in all images of a film. They are written by the encoder
+that comes with imageio-ffmpeg."""
 
-import itertools
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Sequence
 from contextlib import ExitStack
 from os import PathLike
 from pathlib import Path
-from typing import Any, Literal, Protocol
-
-import numpy as np
+from typing import Literal, Protocol
 
 from tribodyn.extras import package
 from tribodyn.refusal import Refusal
 from tribodyn.workflows.pictures.cycle_film import CycleFilm
-from tribodyn.workflows.pictures.matplotlib_names import Figure, FigureCanvasAgg, Image, mpl
+from tribodyn.workflows.pictures.matplotlib_names import FFMpegWriter, Figure, mpl
 from tribodyn.workflows.pictures.offscreen import check
 from tribodyn.workflows.pictures.theme import LAYOUT, STYLE
 from tribodyn.workflows.pictures.wear_film import WearFilm
@@ -57,57 +54,28 @@ def film(
     new_film = WearFilm(result, images, wear) if over == "wear" else CycleFilm(result, row, images, deformation, wear)
     place = Path(folder)
     place.mkdir(parents=True, exist_ok=True)
-    return encode(drawn(new_film, dpi), place / new_film.name, formats)
+    return encode(new_film, place / new_film.name, formats, dpi)
 
 
-def drawn(film: FilmFigure, dpi: int = LAYOUT.film_dpi) -> Iterator[np.ndarray]:
-    """The images (height, width, 3) of a film, all with the layout of the first."""
-    with mpl.rc_context(STYLE):
-        canvas = FigureCanvasAgg(film.figure)
-        film.figure.set_dpi(dpi)
+def encode(film: FilmFigure, stem: Path, formats: Sequence[str], dpi: int = LAYOUT.film_dpi) -> list[Path]:
+    """Write a film in some formats, all images with the layout of the first; its paths.
+
+    Raises  Refusal: a format that is not known, or no encoder"""
+    if unknown := [name for name in formats if name not in FORMATS]:
+        raise Refusal(f'no film format "{unknown[0]}": take {" or ".join(FORMATS)}')
+    paths = [stem.with_name(f"{stem.name}.{name}") for name in dict.fromkeys(formats)]
+    encoder = {"animation.ffmpeg_path": package("imageio_ffmpeg").get_ffmpeg_exe()}
+    with mpl.rc_context({**STYLE, **encoder}), ExitStack() as stack:
+        writers = []
+        for path in paths:
+            quality = ["-pix_fmt", "yuv420p", "-crf", "20", "-movflags", "+faststart"] if path.suffix == ".mp4" else []
+            writers.append(FFMpegWriter(fps=LAYOUT.rate, codec="h264", extra_args=quality))
+            stack.enter_context(writers[-1].saving(film.figure, path, dpi))
         for number in range(film.count):
             film.show(number)
-            canvas.draw()
             if number == 0:
+                film.figure.draw_without_rendering()
                 film.figure.set_layout_engine("none")
-            yield np.asarray(canvas.buffer_rgba())[..., :3].copy()
-
-
-def encode(images: Iterable[np.ndarray], stem: Path, formats: Sequence[str]) -> list[Path]:
-    """Write a film in some formats, each image drawn once.
-
-    images : (height, width, 3), 8 bits a colour, all of one size
-    Returns the paths. Raises Refusal: a format that is not known, or no encoder for MP4"""
-    for name in formats:
-        if name not in FORMATS:
-            raise Refusal(f'no film format "{name}": take {" or ".join(FORMATS)}')
-    paths = {name: stem.with_name(f"{stem.name}.{name}") for name in dict.fromkeys(formats)}
-    gif_images, rate = [], LAYOUT.rate
-    flow = (image[: image.shape[0] // 2 * 2, : image.shape[1] // 2 * 2] for image in images)  # even, as MP4 needs it
-    first = next(flow)
-    with ExitStack() as stack:
-        send = _encoder(paths["mp4"], first, rate, stack) if "mp4" in paths else None
-        for image in itertools.chain([first], flow):
-            if send is not None:
-                send(np.ascontiguousarray(image))
-            if "gif" in paths:
-                gif_images.append(Image.fromarray(image))
-    if gif_images:
-        pages = [image.quantize(dither=Image.Dither.NONE) for image in gif_images]
-        # hundredths of a second are the unit of the format
-        pages[0].save(
-            paths["gif"], save_all=True, append_images=pages[1:], duration=10 * max(round(100 / rate), 2), loop=0
-        )
-    return list(paths.values())
-
-
-def _encoder(path: Path, first: np.ndarray, rate: float, stack: ExitStack) -> Any:
-    """What takes the images of an MP4, closed with the stack."""
-    height, width = first.shape[:2]
-    writer = package("imageio_ffmpeg").write_frames(
-        str(path), (width, height), fps=rate, codec="libx264", quality=None, macro_block_size=2,
-        output_params=["-crf", "20", "-movflags", "+faststart"],
-    )  # fmt: skip
-    stack.callback(writer.close)
-    writer.send(None)
-    return writer.send
+            for writer in writers:
+                writer.grab_frame()
+    return paths

@@ -10,7 +10,7 @@ if TYPE_CHECKING:
 else:
     Figure = Deferred("matplotlib.figure", "Figure")
 BoundaryNorm: Any = Deferred("matplotlib.colors", "BoundaryNorm")
-FigureCanvasAgg: Any = Deferred("matplotlib.backends.backend_agg", "FigureCanvasAgg")
+FFMpegWriter: Any = Deferred("matplotlib.animation", "FFMpegWriter")
 FuncFormatter: Any = Deferred("matplotlib.ticker", "FuncFormatter")
 Image: Any = Deferred("PIL.Image")
 ImageDraw: Any = Deferred("PIL.ImageDraw")

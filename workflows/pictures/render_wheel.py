@@ -26,9 +26,10 @@ class BladeSurface:
     nodes : (n_point,) of the part on its surface; size : largest distance of the part from the axis [m]"""
 
     def __init__(self, wheel: Around, part: PartMesh):
-        shell = drawing.surface(drawing.grid_of(part))
+        shell = drawing.surface(drawing.grid_of(part)).triangulate()
         self.nodes = cKDTree(part.points).query(shell.points)[1]
-        self._faces = _repeated(np.asarray(shell.faces), len(self.nodes), wheel.sectors)
+        blades = len(self.nodes) * np.arange(wheel.sectors)[:, None, None]
+        self._faces = drawing.polygons((shell.regular_faces + blades).reshape(-1, 3))
         self._wheel, axis = wheel, wheel.axis
         self.size = float(np.linalg.norm(np.cross(part.points, axis), axis=1).max())
         across = np.cross(axis, [0.0, 1.0, 0.0] if abs(axis[1]) < 0.9 else [0.0, 0.0, 1.0])
@@ -76,12 +77,3 @@ def instants(wheel: Around, harmonics: tuple[int, ...], displacement: np.ndarray
     functions = basis.functions(np.zeros(1))[0] * (basis.order > 0)
     for n in range(wheel.sectors):
         yield at_sector(basis, displacement, wheel.engine_order, wheel.sectors, n) @ functions
-
-
-def _repeated(faces: np.ndarray, n_point: int, count: int) -> np.ndarray:
-    """Faces of copies of a surface of so many points, one behind the other, as VTK wants them."""
-    index, at = np.ones(len(faces), bool), 0
-    while at < len(faces):
-        index[at] = False  # the number of corners that follow
-        at += int(faces[at]) + 1
-    return np.concatenate([faces + k * n_point * index for k in range(count)])
