@@ -26,6 +26,9 @@ WORN = {**SMALL, "wear.at": "peak", "wear.motion": "balance", "wear.max_steps": 
 # td.scene_names
 print(td.scene_names())
 
+# td.check_law
+print(td.check_law("jenkins"))
+
 # td.read_scene
 scene = td.read_scene("beam", UNWORN)
 print(scene.name, scene.scene.response.frequency)  # [Hz]
@@ -180,11 +183,6 @@ series = [turns / 20, x, np.where(np.sin(2 * np.pi * turns) > 0, falling, rising
 header = "time_s,displacement_um,tangential_N"
 np.savetxt("loops.csv", np.stack(series, 1), delimiter=",", header=header, comments="")
 print(td.studies.loops("loops.csv", normal="30 N"))
-
-# td.studies.asperities
-draw = np.random.default_rng(1)
-face = td.studies.HeightMap(np.arange(64) * 1e-5, np.arange(64) * 1e-5, 1e-6 * draw.standard_normal((64, 64)))
-print(td.studies.asperities(face))
 
 # td.studies.worn
 rows = ["name,work,volume,error", "a,100 J,5.6e5 um3,1e4 um3", "b,200 J,1.09e6 um3,1e4 um3"]

@@ -24,5 +24,4 @@ from tribodyn.workflows.studies.response_derivatives import (
     derivatives as derivatives,
 )
 from tribodyn.workflows.studies.scans.worn_scans import WornScans as WornScans, worn as worn
-from tribodyn.workflows.studies.surfaces import FaceAsperities as FaceAsperities, asperities as asperities
 from tribodyn.workflows.studies.verification import TimeComparison as TimeComparison

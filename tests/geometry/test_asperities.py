@@ -1,16 +1,13 @@
 """Asperities of height maps: caps of known radius and heights, Nayak's random faces, the command, what is refused."""
 
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
 
-import tribodyn as td
-from tests.helpers.command import printed_record, printed_text, refusal
 from tests.helpers.rough_faces import Moments, caps, gaussian
 from tribodyn.geometry.asperities import identify, summits
-from tribodyn.geometry.height_map import HeightMap
+from tribodyn.geometry.height_map import HeightMap, mirrored
 
 RADIUS, SPACING_OF_SUMMITS, STEP = 200e-6, 41e-6, 1e-6
 
@@ -33,12 +30,12 @@ def test_caps_give_their_radius_density_and_gaps():
 
 def test_two_faces_of_caps_that_meet_have_half_the_radius_and_both_heights():
     first = caps(RADIUS, some_heights(), SPACING_OF_SUMMITS, STEP)
-    single, two_results = td.studies.asperities(first).asperities, td.studies.asperities(first, first).asperities
+    single, two_results = identify(first), identify(first, first)
     assert two_results.radius == pytest.approx(RADIUS / 2, rel=1e-4)
     np.testing.assert_allclose(np.sort(two_results.gap), 2 * np.sort(single.gap), atol=1e-12)
     lower = replace(first, z=first.z * (1 - 0.4 * (first.x < first.x.mean()))[:, None])
-    turned = td.studies.asperities(lower, lower, mirror="x").asperities
-    assert turned.height.std() < 0.8 * td.studies.asperities(lower, lower).asperities.height.std()
+    turned = identify(lower, mirrored(lower, "x"))
+    assert turned.height.std() < 0.8 * identify(lower, lower).height.std()
 
 
 def test_two_random_faces_of_different_grids_have_the_sum_of_their_moments():
@@ -96,7 +93,6 @@ def stepped() -> HeightMap:
     (lambda: identify(caps(RADIUS, some_heights(4), SPACING_OF_SUMMITS, STEP)), "16 summits are too few"),
     (lambda: identify(caps(RADIUS, np.full((8, 8), 5e-7), SPACING_OF_SUMMITS, STEP)).table(1), "a table of 1 rows"),
     (lambda: summits(HeightMap(*2 * (np.arange(5.0),), np.full((5, 5), np.nan))), "without height"),
-    (lambda: td.studies.asperities(stepped(), mirror="x"), "one face only"),
 ])  # fmt: skip
 def test_what_has_no_asperities_is_one_sentence(call, words):
     with pytest.raises(ValueError, match=words):
@@ -106,25 +102,3 @@ def test_what_has_no_asperities_is_one_sentence(call, words):
 def test_heights_in_steps_are_cured_by_the_filter_that_the_sentence_names():
     reference = gaussian(200, 1e-6, 60e-6, 16e-6, 0.3e-6, 6)[1]
     assert identify(stepped(), shortest=8e-6).radius == pytest.approx(reference.radius, rel=0.25)
-
-
-def test_the_command_writes_the_table_that_a_contact_takes(capsys: pytest.CaptureFixture[str], tmp_path: Path):
-    face, _ = gaussian(128, 1e-6, 40e-6, 12e-6, 0.3e-6, 7)
-    np.savetxt(tmp_path / "scan.txt", face.z.T * 1e6)
-    units = ["--spacing", "1um,1um", "--lateral-unit", "1 m", "--height-unit", "1um"]
-    out, command = tmp_path / "asperities.csv", ["study", "asperities", str(tmp_path / "scan.txt")]
-    record, fit = printed_record([*command, *units, "--out", str(tmp_path), "--json"], capsys), identify(face)
-    assert record["radius_m"] == pytest.approx(fit.radius, rel=1e-6)
-    np.testing.assert_allclose(np.loadtxt(out, delimiter=","), fit.table(), rtol=1e-6, atol=1e-3)
-    message = printed_text([*command, *units, "--out", str(tmp_path)], capsys)
-    assert 'law = "rough", table = "asperities.csv", radius = "' in message
-    contact = {
-        "law": "rough", "table": out.name, "radius": record["radius_m"], "young": "200 GPa", "poisson": 0.3,
-        "tangential_stiffness": None, "normal_stiffness": None,
-    }  # fmt: skip
-    beam = tmp_path / "beam.toml"
-    beam.write_text(td.read_scene("beam").text)
-    scene = td.read_scene(beam, {f"contact.{key}": value for key, value in contact.items()}).scene
-    assert len(scene.contact.table) == 101
-    for words, cure in ((["--spacing", "1um"], "give two steps"), (["--cutoff", "soon"], "--cutoff")):
-        assert cure in refusal([*command, *units[2:], *words], capsys)

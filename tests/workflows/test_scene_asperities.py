@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 from scipy.ndimage import gaussian_filter
 
-import tribodyn as td
+from tribodyn.geometry import height_map_files
+from tribodyn.geometry.asperities import identify
 from tribodyn.workflows.scene import scene_file
 from tribodyn.workflows.scene.scene_file import SceneError
 
@@ -28,8 +29,8 @@ def scene(tmp_path: Path) -> Path:
 
 def test_the_scan_gives_radius_and_table(scene: Path):
     read = scene_file.read(str(scene), [NO_TABLE, "contacts.lap.radius=", *FACES]).scene.joints["lap"]
-    scales = {"cutoff": CUTOFF, "shortest": SHORTEST, "spacing": (SPACING, SPACING)}
-    computed = td.studies.asperities(scene.parent / "scan.txt", **scales).asperities
+    scan = height_map_files.read(scene.parent / "scan.txt", spacing=(SPACING, SPACING))
+    computed = identify(scan, cutoff=CUTOFF, shortest=SHORTEST)
     assert read.numbers["radius"] == pytest.approx(computed.radius, rel=1e-12)
     np.testing.assert_allclose(np.array(read.table), computed.table(), rtol=1e-12)
     inputs = scene_file.read(str(scene), [NO_TABLE, *FACES]).scene.joints["lap"]

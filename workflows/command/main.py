@@ -48,7 +48,7 @@ WORDS = {  # word -> where it is, its help on the page of all of them, an exampl
         "export results/beam --to csv"),
     "curve": ("curve_words:app", "Follow curves: backbone, ring-down."),
     "wheel": ("wheel_words:app", "Wheels: modes, flutter, mistuned blades and patterns of them."),
-    "study": ("study_words:app", "Studies: grid, lives, optimise, identify, converge, asperities and more."),
+    "study": ("study_words:app", "Studies: grid, lives, optimise, identify, converge and more."),
 }  # fmt: skip
 
 app = cyclopts.App(

@@ -11,7 +11,6 @@ from tribodyn.workflows.studies.measured.compare import compare
 from tribodyn.workflows.studies.measured.measured_loops import loops
 from tribodyn.workflows.studies.response_derivatives import derivatives
 from tribodyn.workflows.studies.scans.worn_scans import worn
-from tribodyn.workflows.studies.surfaces import asperities
 
 app = group(
     "study",
@@ -22,7 +21,6 @@ app = group(
     word(derivatives, "study derivatives"),
     word(converge, "study converge"),
     word(forces, "study forces"),
-    word(asperities, "study asperities", into="asked"),
     word(compare, "study compare"),
     word(loops, "study loops"),
     word(worn, "study worn", into="asked"),
