@@ -17,7 +17,6 @@ from tribodyn.hbm.outcome import BranchEnd, WearEnd
 from tribodyn.reduction.linear import linear_modes
 from tribodyn.workflows.errors import operating_states, refine
 from tribodyn.workflows.errors.refinement_limits import DEFAULT
-from tribodyn.workflows.report import text as in_words
 from tribodyn.workflows.result import summary
 from tribodyn.workflows.run import modelling, pipeline, planning, sanity_checks
 from tribodyn.workflows.run.progress import Progress
@@ -248,27 +247,6 @@ def test_a_free_structure_wears(tmp_path: Path) -> None:
     assert joint["preload"] == pytest.approx({"first": 400.0, "last": 400.0}, rel=1e-6)
     assert joint["area"] == pytest.approx(8e-4)
     assert joint["volume"] == pytest.approx(1e-12 * joint["friction_work"])  # coefficient times friction work
-
-
-def test_results_are_told_by_joint(tmp_path: Path) -> None:
-    """Two joints with coefficients of their own: each loses its coefficient times its own friction work."""
-    bar(tmp_path)
-    joints = "".join(
-        f'[contacts.{name}]\nfirst = "patch_{i}"\nsecond = "ground"\n{LAW}tangential_stiffness = 1e7\n'
-        f"normal_stiffness = 1e7\nwear = {{coefficient = {coefficient}}}\n"
-        for name, i, coefficient in (("near", 5, 1e-12), ("far", 7, 3e-12))
-    )
-    wear = '[wear]\ncoefficient = 1e-12\nrule = "thesis"\nstep = "0.5 um"\nmax_steps = 1\nat = "300 Hz"\n'
-    text = BAR.replace('["700 Hz", "900 Hz"]', '["290 Hz", "310 Hz"]\npoints = 3') + joints + wear
-    result = pipeline.run(scene_file.parse(text, "scene.toml", QUIET, tmp_path), None, Progress())
-    outcome = summary.summary(result)
-    for name, coefficient in (("near", 1e-12), ("far", 3e-12)):
-        joint = outcome["joints"][name]
-        assert joint["friction_work"] > 0
-        assert joint["volume"] == pytest.approx(coefficient * joint["friction_work"], rel=1e-9)
-    for total, part in (("friction_work", "friction_work"), ("volume", "volume")):
-        assert outcome[total] == pytest.approx(sum(joint[part] for joint in outcome["joints"].values()), rel=1e-12)
-    assert "joints.near" in dict(in_words.lines(result))
 
 
 PULL = '[loads.static.pull]\ngroup = "b.x_max"\ndirection = "x"\nvalue = "2 kN"\n'

@@ -12,11 +12,10 @@ from proof.cases.rig import cases as rig_cases, fit as rig_fit, published, table
 from proof.cases.rig.cases import apart, in_time
 from proof.cases.rig.joints import Modes, joints_of
 from proof.cases.rig.model import Rig
-from proof.cases.rig.wear import RigWear, wear_down
+from proof.cases.rig.wear import wear_down
 from tests.helpers.coarse_scenes import QUICK_RIG as QUICK, RIG as COARSE
 from tests.helpers.fits import STEP, fit_by_differences as fit
 from tribodyn.hbm.outcome import WearEnd
-from tribodyn.hbm.wear import law as wear_law
 from tribodyn.reduction.linear import stuck_stiffness
 from tribodyn.workflows.run import settings
 from tribodyn.workflows.run.joints import contact_stiffness
@@ -153,17 +152,6 @@ def test_life_and_work_tell_the_coefficient(rig):
         rig_fit.fit_coefficient(replace(run, history=stopped), 5.5e-15)
 
 
-def test_both_wear_rules_use_up_the_preload_alike():
-    def run(*overrides: str) -> RigWear:
-        return wear_down(Rig.of(scene_file.read("rig_thesis", (*QUICK, *overrides))), 0.0, lambda sentence: None)
-
-    explicit, controlled = run("wear.step=4 %"), run("wear.rule=error_controlled", "wear.tolerance=5 %")
-    level = np.linspace(0.9, 0.4, 6) * explicit.rest[0]
-    for quantity in ("spent", "volume"):
-        a, b = (np.interp(-level, -r.rest, getattr(r, quantity)) for r in (explicit, controlled))
-        np.testing.assert_allclose(a, b, rtol=0.1)
-
-
 # ---- the study ----
 
 
@@ -208,19 +196,6 @@ def test_the_study_compares_every_number_and_draws(tmp_path, capsys, monkeypatch
 def test_a_scene_that_is_not_this_rig_is_one_sentence(override, words):
     with pytest.raises(ValueError, match=words):
         Rig.of(scene_file.read("rig_thesis", (override,)))
-
-
-def test_a_wear_law_beside_the_scene_is_found(tmp_path):
-    """The law of a file, the energy's own written once more, gives the same wear."""
-    law = (Path(wear_law.__file__).parent / "laws" / "energy.py").read_text(encoding="utf-8")
-    text = scene_file.find("rig_thesis").read_text(encoding="utf-8")
-    (tmp_path / "own.py").write_text(law, encoding="utf-8")
-    (tmp_path / "mine.toml").write_text(text, encoding="utf-8")
-    depths = []
-    for extra in ((), ("wear.law=own.py",)):
-        file = scene_file.read(str(tmp_path / "mine.toml"), (*QUICK, "wear.max_steps=2", *extra))
-        depths.append(wear_down(Rig.of(file), 0.0, lambda sentence: None).history.depth)
-    np.testing.assert_allclose(depths[1], depths[0], rtol=1e-12)
 
 
 def test_differences_are_relative():

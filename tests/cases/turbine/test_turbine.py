@@ -10,6 +10,7 @@ from tests.helpers.browser import chromium, clicked_zoomed_and_turned
 from tribodyn.hbm import newton
 from tribodyn.hbm.continuation.methods import arc_length
 from tribodyn.workflows.cases.turbine import bladed_sector
+from tribodyn.workflows.report import text as in_words
 from tribodyn.workflows.studies.forces import BodyForces
 
 COARSE = (
@@ -86,6 +87,9 @@ def test_every_contact_is_told_by_itself(worn: td.Result) -> None:
         coefficient = 1e-14 if name == "damper_left" else 2e-14
         assert joint["volume"] == pytest.approx(coefficient * joint["friction_work"], rel=1e-9)
     assert all(joint["pairs"] > 0 for joint in joints.values())
+    for total in ("friction_work", "volume"):
+        assert result.summary()[total] == pytest.approx(sum(joint[total] for joint in joints.values()), rel=1e-12)
+    assert "joints.shroud" in dict(in_words.lines(result))
     lives = []
     for name, pairs in result.facts.joints.items():
         preload, life = result.wear.normal_force[:, pairs].sum(axis=1), joints[name]["life"]
