@@ -113,7 +113,7 @@ def _plain_march(law: ModuleType, samples: np.ndarray, p: np.ndarray, memory: np
     no_slope, none = np.zeros((0, samples.shape[1], 0)), np.zeros((memory.shape[1], 0))
     for i, s in enumerate(memory.copy()):
         for _ in range(FIRST_CYCLES):
-            if _turn(pointer(law.step), samples[i], p[i], phi, s, none, no_slope, force[i])[1] <= PERIODIC_DRIFT:
+            if turn(pointer(law.step), samples[i], p[i], phi, s, none, no_slope, force[i])[1] <= PERIODIC_DRIFT:
                 break
         else:
             return None
@@ -130,9 +130,14 @@ def _periodic(
     jac = np.zeros((n_pair, n_comp * weight.shape[1], n_comp * phi.shape[1]))
     rows, columns = np.ascontiguousarray(weight.T), np.ascontiguousarray(phi)
     lost = _cycles(pointer(law.step), samples, parameters.packed(), memory, columns, rows, force, jac, status)
+    require_periodic(lost)
+    return force, jac, status
+
+
+def require_periodic(lost: int) -> None:
+    """Raise CycleNotPeriodic for a pair that is lost, -1 for none."""
     if lost >= 0:
         raise CycleNotPeriodic(f"contact pair {lost} has no periodic cycle within {MAX_CYCLES} cycles")
-    return force, jac, status
 
 
 @numba.njit(cache=True)
@@ -147,18 +152,18 @@ def _cycles(step, x, p, memory, phi, rows, force, jac, status):
     no_slope, no_force = np.zeros((0, n_comp, m + n_state)), np.zeros((n_comp, 0))
     for i in range(n_pair):
         s, ds = memory[i].copy(), np.zeros((n_state, m))
-        marched = _settle(step, x[i], p[i], phi, s, ds) if n_state > 0 else 0
+        marched = settle(step, x[i], p[i], phi, s, ds) if n_state > 0 else 0
         if marched < 0:
             return i
-        start, slopes = s.copy(), _unit(n_state, m)
+        start, slopes = s.copy(), unit(n_state, m)
         slope = np.zeros((n_time, n_comp, m + n_state))
-        status[i] = _turn(step, x[i], p[i], phi, start, slopes, slope, force[i])[0]
+        status[i] = turn(step, x[i], p[i], phi, start, slopes, slope, force[i])[0]
         if m == 0:
             continue
-        if marched > 0 and _undrifted(slopes, slopes, ds) <= LEAST_CONTRACTION:  # its memory depends on its path
+        if marched > 0 and undrifted(slopes, slopes, ds) <= LEAST_CONTRACTION:  # its memory depends on its path
             s[:], ds[:] = memory[i], 0.0
             for _ in range(marched):
-                _turn(step, x[i], p[i], phi, s, ds, no_slope, no_force)
+                turn(step, x[i], p[i], phi, s, ds, no_slope, no_force)
         product = rows @ slope.reshape(n_time, n_comp * (m + n_state))
         for a in range(len(rows)):
             for c in range(n_comp):
@@ -171,7 +176,7 @@ def _cycles(step, x, p, memory, phi, rows, force, jac, status):
 
 
 @numba.njit(cache=True)
-def _settle(step, x, p, phi, s, ds):
+def settle(step, x, p, phi, s, ds):
     """Memory s (n_state,) of one pair at the start of its periodic cycle, from that at the start of the load path.
 
     A Jenkins slider settles in one cycle. Planar friction contracts slowly where it slips little, so after a few
@@ -187,25 +192,25 @@ def _settle(step, x, p, phi, s, ds):
     no_slope, no_force, none = np.zeros((0, n_comp, n_state)), np.zeros((n_comp, 0)), np.zeros((n_state, 0))
     shift, correction = np.zeros((n_state, 1)), np.zeros((n_state, 1))
     for count in range(1, MAX_CYCLES):
-        if _turn(step, x, p, phi, s, none, no_slope, no_force)[1] <= PERIODIC_DRIFT:
+        if turn(step, x, p, phi, s, none, no_slope, no_force)[1] <= PERIODIC_DRIFT:
             return count
         if count < FIRST_CYCLES or count & (count - 1):
             continue
         trial, firm, closing = s.copy(), s.copy(), False  # closing : a step before, at firm, was small and contracted
         for _ in range(NEWTON_CYCLES):
-            following, slopes = trial.copy(), _unit(n_state, 0)
-            drift = _turn(step, x, p, phi[:, :0].copy(), following, slopes, no_slope, no_force)[1]
+            following, slopes = trial.copy(), unit(n_state, 0)
+            drift = turn(step, x, p, phi[:, :0].copy(), following, slopes, no_slope, no_force)[1]
             shift[:, 0] = following - trial
-            isolated = _undrifted(slopes, shift, correction) > LEAST_CONTRACTION
+            isolated = undrifted(slopes, shift, correction) > LEAST_CONTRACTION
             if drift <= PERIODIC_DRIFT or (closing and not isolated and drift < POLISH_DRIFT):
                 if not (isolated or closing):
                     break
                 s[:] = trial
                 if isolated:
                     return count
-                slopes = _unit(n_state, m)
-                _turn(step, x, p, phi, firm, slopes, no_slope, no_force)
-                _undrifted(slopes, slopes, ds)
+                slopes = unit(n_state, m)
+                turn(step, x, p, phi, firm, slopes, no_slope, no_force)
+                undrifted(slopes, slopes, ds)
                 return 0
             if isolated and drift < POLISH_DRIFT:
                 closing = True
@@ -215,7 +220,7 @@ def _settle(step, x, p, phi, s, ds):
 
 
 @numba.njit(cache=True)
-def _unit(n, m):
+def unit(n, m):
     """(n, m + n) zeros and behind them the unit matrix."""
     out = np.zeros((n, m + n))
     for r in range(n):
@@ -224,7 +229,7 @@ def _unit(n, m):
 
 
 @numba.njit(cache=True)
-def _undrifted(slopes, shift, out):
+def undrifted(slopes, shift, out):
     """Fill out with (1 - M)^-1 moved, M the last columns of slopes; its columns are the first of moved.
 
     Singular values of 1 - M are raised to LEAST_CONTRACTION. Returns the least of them"""
@@ -247,7 +252,7 @@ def _undrifted(slopes, shift, out):
 
 
 @numba.njit(cache=True)
-def _turn(step, x, p, phi, s, ds, slope, force):
+def turn(step, x, p, phi, s, ds, slope, force):
     """One cycle of one pair: s and ds to their values after it.
 
     ds : (n_state, n) its first columns those of the coefficients of x, those beyond carried along; or no columns

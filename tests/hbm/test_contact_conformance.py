@@ -298,7 +298,7 @@ def test_memory_repeats(name, components):
     def settle(start):
         other = start.copy()
         for u, p, s in zip(samples, parameters.packed(), other, strict=True):
-            assert aft._settle(pointer(law.step), u, p, phi, s, none) >= 0
+            assert aft.settle(pointer(law.step), u, p, phi, s, none) >= 0
         return other
 
     stationary = settle(memory)
