@@ -130,14 +130,9 @@ def _periodic(
     jac = np.zeros((n_pair, n_comp * weight.shape[1], n_comp * phi.shape[1]))
     rows, columns = np.ascontiguousarray(weight.T), np.ascontiguousarray(phi)
     lost = _cycles(pointer(law.step), samples, parameters.packed(), memory, columns, rows, force, jac, status)
-    require_periodic(lost)
-    return force, jac, status
-
-
-def require_periodic(lost: int) -> None:
-    """Raise CycleNotPeriodic for a pair that is lost, -1 for none."""
     if lost >= 0:
         raise CycleNotPeriodic(f"contact pair {lost} has no periodic cycle within {MAX_CYCLES} cycles")
+    return force, jac, status
 
 
 @numba.njit(cache=True)
@@ -196,13 +191,19 @@ def settle(step, x, p, phi, s, ds):
             return count
         if count < FIRST_CYCLES or count & (count - 1):
             continue
+        best, least = s.copy(), np.inf
         trial, firm, closing = s.copy(), s.copy(), False  # closing : a step before, at firm, was small and contracted
-        for _ in range(NEWTON_CYCLES):
+        for newton in range(NEWTON_CYCLES):
             following, slopes = trial.copy(), unit(n_state, 0)
             drift = turn(step, x, p, phi[:, :0].copy(), following, slopes, no_slope, no_force)[1]
+            is_last = newton == NEWTON_CYCLES - 1
+            if 2 * newton > NEWTON_CYCLES and drift > least and not is_last:  # to and fro across a kink: half-way back
+                trial = 0.5 * (trial + best)
+                continue
+            best[:], least = trial, drift
             shift[:, 0] = following - trial
             isolated = undrifted(slopes, shift, correction) > LEAST_CONTRACTION
-            if drift <= PERIODIC_DRIFT or (closing and not isolated and drift < POLISH_DRIFT):
+            if drift <= PERIODIC_DRIFT or (closing and (is_last or not isolated) and drift < POLISH_DRIFT):
                 if not (isolated or closing):
                     break
                 s[:] = trial

@@ -1,9 +1,8 @@
 """The periodic cycle of planar sliders between equal springs, at its samples, with its derivative.
 
 Displacement and normal load are linear between samples and the slider is followed exactly along such a chord, see
-`hbm.contact.laws.coulomb_planar`. Its state is [w, displacement at the sample before]. A sample that sticks costs some
-ten operations. Of the derivatives only the two rows of the slider are carried from sample to sample, those of the
-displacement are the basis functions themselves; one product with the weights of the basis ends it."""
+`hbm.contact.laws.coulomb_planar`. Its state is [w, displacement at the sample before]. Of the derivatives only the two
+rows of the slider are carried from sample to sample; one product with the weights of the basis ends it."""
 
 import math
 
@@ -15,10 +14,6 @@ from tribodyn.hbm.contact.compiled_law import pointer, stamp_with
 from tribodyn.hbm.contact.contact_law import SEPARATES, SLIPS, STICKS, ContactCycle, ContactParameters
 from tribodyn.hbm.contact.trigonometric import compiled
 from tribodyn.hbm.harmonics import HarmonicBasis
-
-NEWTON_CYCLES = 8
-FIRM = 1e-6  # contraction from which on Newton's step is taken
-CLOSE = 1e-8  # relative size of the last one, which leaves its square
 
 
 def cycle(
@@ -35,7 +30,8 @@ def cycle(
     jac = np.zeros((len(x), 3 * phi.shape[1], 3 * phi.shape[1]))
     rows, columns = np.ascontiguousarray(basis.analysis.T), np.ascontiguousarray(phi)
     lost = _cycles(pointer(chord), samples, parameters.packed(), start, columns, rows, force, jac, status)
-    aft.require_periodic(lost)
+    if lost >= 0:
+        raise aft.CycleNotPeriodic(f"contact pair {lost} has no periodic cycle")
     return ContactCycle(basis.from_time(force), jac if jacobian else None, status)
 
 
@@ -45,9 +41,9 @@ def _cycles(chord, x, p, memory, phi, rows, force, jac, status):
     n_time, n_coeff = x.shape[2], phi.shape[1]
     m = 3 * n_coeff
     w = m + 2
-    trace, slope = np.empty((n_time, 2)), np.empty((n_time, 2 * w + n_coeff))
-    none, unread, plane = np.empty((0, 0)), np.empty((2, 0)), np.empty((2, 2))
-    work = np.empty((3, 5)), np.empty((3, 3)), np.empty((3, 5)), np.empty((5, 3)), np.empty((5, 5))
+    slope, plane = np.empty((n_time, 2 * w + n_coeff)), np.empty((2, 2))
+    none, unread = np.empty((0, 0)), np.empty((2, 0))
+    work = np.empty((2, 3)), np.empty((3, 3)), np.empty((3, 5))
     for i in range(len(x)):
         if _sticks(x[i], p[i], memory[i], force[i]):
             status[i] = STICKS
@@ -61,7 +57,7 @@ def _cycles(chord, x, p, memory, phi, rows, force, jac, status):
             if is_thorough:
                 marched = aft.settle(chord, x[i], p[i], phi, s, ds)
             else:
-                marched = _settle(x[i], p[i], phi, s, trace, none, plane, work)
+                marched = _settle(x[i], p[i], phi, s, unread, none, plane, work)
             if marched < 0:
                 continue
             status[i] = _turn(x[i], p[i], phi, n_coeff, s, True, carried if m > 0 else unread, slope, force[i], work)
@@ -100,40 +96,30 @@ def _sticks(x, p, s, force):
 
 
 @compiled
-def _settle(x, p, phi, s, trace, none, plane, work):
+def _settle(x, p, phi, s, unread, none, plane, work):
     """The state s of one pair at the start of its periodic cycle, from that at the start of the load path.
 
-    A cycle never widens the distance of two sliders. Where one meets that of the cycle before, so does all that comes;
-    and a cycle that comes back to its start and contracts is the only one, so that Newton's step may lead to it.
-    trace : (n_time, 2) sliders, to work on as what follows
+    A cycle never widens the distance of two sliders: one that comes back to its start and contracts is the only one, so
+    that Newton's step for it may begin after the first. Others are left to `hbm.contact.aft.settle`.
     Returns the cycles marched, 0 where Newton's step led to it, -1 where neither does"""
-    n_time, size = x.shape[1], 0.0
-    for j in range(n_time):
+    size = np.finfo(np.float64).tiny
+    for j in range(x.shape[1]):
         size = max(size, abs(x[0, j]), abs(x[1, j]))
-    for marched in range(2):
-        for j in range(n_time):
-            for c in range(3):
-                work[0][0, c] = x[c, j]
-            _advance(work[0][0], s, p, work, False)
-            drift = max(abs(s[0] - trace[j, 0]), abs(s[1] - trace[j, 1]))
-            if marched > 0 and drift <= aft.PERIODIC_DRIFT * size:
-                s[0], s[1] = trace[n_time - 1, 0], trace[n_time - 1, 1]
-                for c in range(3):
-                    s[2 + c] = x[c, n_time - 1]
-                return marched
-            trace[j, 0], trace[j, 1] = s[0], s[1]
-    for _ in range(NEWTON_CYCLES):
+    _turn(x, p, phi, 0, s, False, unread, none, none, work)
+    for count in range(aft.NEWTON_CYCLES):
         a, b = s[0], s[1]
         plane[0, 0], plane[0, 1], plane[1, 0], plane[1, 1] = 1.0, 0.0, 0.0, 1.0
         _turn(x, p, phi, 0, s, True, plane, none, none, work)
         da, db = s[0] - a, s[1] - b
+        if count == 0 and max(abs(da), abs(db)) <= aft.PERIODIC_DRIFT * size:
+            return 1
         xx, yy = 1.0 - plane[0, 0], 1.0 - plane[1, 1]
         area = xx * yy - plane[0, 1] * plane[1, 0]
-        if not area > FIRM * (xx * xx + yy * yy + plane[0, 1] ** 2 + plane[1, 0] ** 2):
+        if not area > aft.POLISH_DRIFT * (xx * xx + yy * yy + plane[0, 1] ** 2 + plane[1, 0] ** 2):
             break
         da, db = (yy * da + plane[0, 1] * db) / area, (plane[1, 0] * da + xx * db) / area
         s[0], s[1] = a + da, b + db
-        if max(abs(da), abs(db)) <= CLOSE * size:
+        if da * da + db * db <= aft.PERIODIC_DRIFT * size * size:  # it leaves its square
             return 0
     return -1
 
@@ -151,7 +137,7 @@ def _turn(x, p, phi, n_coeff, s, follows, ds, slope, force, work):
     for j in range(n_time):
         for c in range(3):
             points[0, c] = x[c, j]
-        state = _advance(points[0], s, p, work, n > 0)
+        state = _advance(points[0], s, p, points[1], dfx, dfs, n > 0)
         bits |= STICKS if state == 0 else state
         for c in range(len(force)):
             force[c, j] = points[1, c]
@@ -181,38 +167,40 @@ def _turn(x, p, phi, n_coeff, s, follows, ds, slope, force, work):
 @numba.njit(cache=True)
 def chord(x, s, p, f, dfx, dfs, dsx, dss):
     """As the `step` of a law, from the displacement that the memory ends with; s = [w, displacement]."""
-    points = np.empty((3, 5))
-    state = _advance(x, s, p, (points, dfx, dfs, dsx, dss), True)
-    for c in range(3):
-        f[c], dsx[2 + c, c] = points[1, c], 1.0
+    state = _advance(x, s, p, f, dfx, dfs, True)
     dfx[2, 2] = p[2] if state != SEPARATES else 0.0
-    for c in range(2 if state == 0 else 0):
-        dfx[c, c], dfs[c, c], dss[c, c] = p[0], -p[0], 1.0
+    for c in range(2):
+        if state == 0:
+            dfx[c, c], dfs[c, c] = p[0], -p[0]
+        dsx[c], dss[c] = -dfx[c] / p[0], -dfs[c] / p[0]  # w = u - T / k
+        dsx[c, c] += 1.0
+    for c in range(3):
+        dsx[2 + c, c] = 1.0
     return STICKS if state == 0 else state
 
 
 @compiled
-def _advance(x, s, p, work, with_slopes):
-    """One chord, with its derivatives or without; the force goes to work[0][1], further work : dfx, dfs, dsx, dss.
+def _advance(x, s, p, f, dfx, dfs, with_slopes):
+    """One chord: the force, and where wanted its derivatives by x and s.
 
     Returns 0 where the slider stays, whose derivatives are not filled, else the status"""
-    f, dfx, dfs, dsx, dss = work[0][1], work[1], work[2], work[3], work[4]
-    k, f[2], state = p[0], p[2] * (x[2] - p[3]), SEPARATES
+    k, state = p[0], SEPARATES
     if x[2] > p[3]:
-        state = _dragged(x, s, k, p[4] * p[2] / k, p[3], f, dfx, dfs, dsx, dss, with_slopes)
+        f[2] = p[2] * (x[2] - p[3])
+        state = _dragged(x, s, k, p[4] * p[2] / k, p[3], f, dfx, dfs, with_slopes)
     else:
         f[0], f[1], f[2], s[0], s[1] = 0.0, 0.0, 0.0, x[0], x[1]
         for c in range(2 if with_slopes else 0):
-            for q in range(5):
-                dfs[c, q], dss[c, q] = 0.0, 0.0
             for q in range(3):
-                dfx[c, q], dsx[c, q] = 0.0, 1.0 if q == c else 0.0
+                dfx[c, q] = 0.0
+            for q in range(5):
+                dfs[c, q] = 0.0
     s[2], s[3], s[4] = x[0], x[1], x[2]
     return state
 
 
 @compiled
-def _dragged(x, s, k, r, gap, f, dfx, dfs, dsx, dss, with_slopes):
+def _dragged(x, s, k, r, gap, f, dfx, dfs, with_slopes):
     """One chord that ends in contact, the leash r (v - gap) [m]; arguments as of `chord`.
 
     A stretch that is longer than the leash is cut to it first, as no periodic cycle has it: a search for one does"""
@@ -253,12 +241,10 @@ def _dragged(x, s, k, r, gap, f, dfx, dfs, dsx, dss, with_slopes):
     for q in range(8 if with_slopes else 0):  # directions: x, y, v at the end; w and x, y, v at the beginning
         tx, ty = grows_x[q] - py * turns[q], grows_y[q] + px * turns[q]
         if q < 3:
-            dfx[0, q], dfx[1, q], dsx[0, q], dsx[1, q] = k * tx, k * ty, -tx, -ty
+            dfx[0, q], dfx[1, q] = k * tx, k * ty
         else:
-            dfs[0, q - 3], dfs[1, q - 3], dss[0, q - 3], dss[1, q - 3] = k * tx, k * ty, -tx, -ty
+            dfs[0, q - 3], dfs[1, q - 3] = k * tx, k * ty
     f[0], f[1], s[0], s[1] = k * px, k * py, x[0] - px, x[1] - py
-    if with_slopes:
-        dsx[0, 0], dsx[1, 1] = dsx[0, 0] + 1.0, dsx[1, 1] + 1.0
     return bits
 
 

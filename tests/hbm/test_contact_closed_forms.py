@@ -1,10 +1,13 @@
 """Contact laws against closed forms: Jenkins describing function, planar Coulomb on a circle, unilateral half sine."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 
+from tests.helpers.contact_draws import HARMONICS, draw
 from tests.helpers.jenkins import describing_function
-from tribodyn.hbm.contact import aft, contact_law
+from tribodyn.hbm.contact import aft, contact_law, planar_cycle
 from tribodyn.hbm.contact.contact_law import SEPARATES, SLIPS, STICKS, ContactParameters
 from tribodyn.hbm.harmonics import HarmonicBasis
 
@@ -120,6 +123,34 @@ def test_a_planar_slider_that_can_just_stick_comes_to_the_middle_of_its_ellipse(
     parameters = ContactParameters.of(("t1", "t2", "n"), [[1.0, 1.0, 1.0]], friction=1.0)
     force = aft.cycle(contact_law.load("coulomb_planar"), x, parameters, basis, None, False).force[0, :2, 0]
     assert force == pytest.approx([0.0, np.sqrt(max(1 - (1 + more) ** 2, 0.0))], abs=1e-5)
+
+
+@pytest.mark.parametrize("harmonics", HARMONICS, ids=str)
+def test_planar_sliders_between_equal_springs_are_their_chords_marched(harmonics):
+    """The compiled cycle, whose period Newton's step finds, beside one chord after the other until the memory repeats;
+    the Jacobian of pairs that have come to stick, at the edge of slip, to the rounding of that edge."""
+    basis = HarmonicBasis(harmonics, 64)
+    x, drawn, memory = draw("coulomb_planar", ("t1", "t2", "n"), basis, 300, seed=8)
+    k = drawn.stiffness[:, [0, 0, 2]]
+    parameters = ContactParameters.of(drawn.components, k, gap=drawn.gap, **drawn.numbers)
+    start = np.concatenate([memory, memory, parameters.gap[:, None]], axis=1)
+    slow = aft.march(SimpleNamespace(step=planar_cycle.chord), x, parameters, start, basis)
+    fast = aft.cycle(contact_law.load("coulomb_planar"), x, parameters, basis, memory)
+    np.testing.assert_allclose(fast.force, slow.force, atol=1e-9)
+    np.testing.assert_allclose(fast.slope, slow.slope, atol=1e-6)
+    plain = aft.cycle(contact_law.load("coulomb_planar"), x, parameters, basis, memory, False)
+    np.testing.assert_allclose(plain.force, fast.force, atol=1e-9)
+
+
+def test_a_planar_slider_that_creeps_has_a_cycle():
+    """It once had none within 500: Newton's step for it went to and fro across a kink of the period map."""
+    basis, x = HarmonicBasis((0, 1, 2), 256), np.zeros((1, 3, 5))
+    x[0, 0] = [0.0013721, 0.158889, -0.393687, -0.0597611, -0.00925692]
+    x[0, 1] = [-0.00163752, -0.207696, -0.294179, 0.0873076, -0.0620917]
+    x[0, 2, 0] = 1.0
+    parameters = ContactParameters.of(("t1", "t2", "n"), [[1.0, 1.0, 1.0]], friction=0.5)
+    force = aft.cycle(contact_law.load("coulomb_planar"), x, parameters, basis).force[0, :2, 0]
+    assert force == pytest.approx([-0.07041, 0.10147], abs=2e-4)
 
 
 def test_planar_coulomb_along_a_line_is_a_jenkins_element():

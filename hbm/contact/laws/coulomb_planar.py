@@ -124,24 +124,9 @@ def sampled_cycle(
 ) -> ContactCycle:
     """The periodic cycle at the samples of the basis, the slider followed exactly along the chords between them.
 
-    Pairs of unequal springs step implicitly. x : (n_pair, 3, n_coeff) [m]; memory : (n_pair, 2) sliders at the start"""
+    Where a pair has unequal springs, or no friction, all step implicitly.
+    x : (n_pair, 3, n_coeff) [m]; memory : (n_pair, 2) sliders at the start [m]"""
     k = parameters.stiffness
-    is_followed = (k[:, 0] == k[:, 1]) & (k[:, 0] > 0) & (parameters.numbers["friction"] > 0)
-    if is_followed.all():
+    if ((k[:, 0] == k[:, 1]) & (k[:, 0] > 0) & (parameters.numbers["friction"] > 0)).all():
         return planar_cycle.cycle(x, parameters, memory, basis, jacobian)
-    m = k.shape[1] * x.shape[2] if jacobian else 0
-    force, jac, status = np.empty_like(x), np.empty((len(x), m, m)), np.empty(len(x), np.int64)
-    for chosen, cycle in ((is_followed, planar_cycle.cycle), (~is_followed, _stepped)):
-        pairs = np.flatnonzero(chosen)
-        part = cycle(x[pairs], parameters.subset(pairs), memory[pairs], basis, jacobian)
-        force[pairs], status[pairs] = part.force, part.status
-        if jacobian:
-            jac[pairs] = part.slope
-    return ContactCycle(force, jac if jacobian else None, status)
-
-
-def _stepped(
-    x: np.ndarray, parameters: ContactParameters, memory: np.ndarray, basis: HarmonicBasis, jacobian: bool
-) -> ContactCycle:
-    """The cycle by implicit steps."""
     return aft.march(sys.modules[__name__], x, parameters, memory, basis, jacobian)
