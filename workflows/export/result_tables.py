@@ -62,7 +62,7 @@ def _plain(column: np.ndarray) -> np.ndarray:
 
 
 def write_uff(result: Result, folder: Path) -> list[Path]:
-    """result.uff: complex response of every output and harmonic, histories under wear, loops, as datasets 58.
+    """result.uff: complex response of every output and harmonic, as datasets 58.
 
     Of a displacement a cos(hwt) + b sin(hwt) the complex value a - ib is written, with exp(+ihwt) understood. Where the
     scene is driven by one force in harmonic 1, harmonic 1 is a frequency response function, displacement over force.
@@ -72,7 +72,7 @@ def write_uff(result: Result, folder: Path) -> list[Path]:
     path = folder / "result.uff"
     path.unlink(missing_ok=True)
     file = pyuff.UFF(str(path))
-    for entry in (_units(), *_spectra(result), *_histories(result), *_loops(result)):
+    for entry in (_units(), *_spectra(result)):
         file.write_sets(entry, "add")
     return [path]
 
@@ -101,39 +101,6 @@ def _spectra(result: Result) -> list[dict[str, Any]]:
                 entry |= {"orddenom_spec_data_type": DataKind.EXCITATION, "orddenom_axis_lab": "force"}
                 entry |= {"orddenom_axis_units_lab": "N"}
             datasets.append(entry)
-    return datasets
-
-
-def _histories(result: Result) -> list[dict[str, Any]]:
-    table = tables(result).get("wear")
-    if table is None:
-        return []
-    cycles, plain = table["cycles"], DataKind.PLAIN
-    return [
-        function(Function.GENERAL, header(quantity), "cycles", plain, "", cycles, plain, quantity.unit, values)
-        for quantity, values in histories_of(result).items()
-    ]
-
-
-def _loops(result: Result) -> list[dict[str, Any]]:
-    """Displacement and force over a period of the pair that moves most, in each kept state and component."""
-    stored, patch = result.loops, result.patch
-    if stored is None:
-        return []
-    datasets = []
-    phase = 2 * np.pi * np.arange(stored.force.shape[-1]) / stored.force.shape[-1]
-    for at, row in enumerate(stored.row):
-        pair = int(np.argmax(np.ptp(stored.displacement[at], axis=-1).max(axis=-1)))
-        for c, component in enumerate(patch.components):
-            for quantity_name, values, kind, unit in (
-                ("displacement", stored.displacement, DataKind.DISPLACEMENT, "m"),
-                ("force", stored.force, DataKind.FORCE, "N"),
-            ):  # fmt: skip
-                text = f"state {row}, pair {pair}, {component}, {quantity_name}"
-                y = values[at, pair, c]
-                datasets.append(
-                    function(Function.TIME, text, "phase", DataKind.TIME, "rad", phase, kind, unit, y, pair)
-                )
     return datasets
 
 
