@@ -11,6 +11,7 @@ import numpy as np
 
 from proof.hard_settings.extremes_models import Body, lattice, rigid
 from tests.helpers.stability_in_time import stability_in_time
+from tests.helpers.structures import BLOCKS
 from tribodyn.fem.system import SecondOrderSystem
 from tribodyn.hbm import newton
 from tribodyn.hbm.balance import HarmonicBalance
@@ -40,42 +41,18 @@ from tribodyn.workflows.scene import scene_file
 Numbers = dict[str, np.ndarray]
 NOTHING = 1e-9  # of the largest entry: a smaller difference is none
 
-STEEL = 'young = "210 GPa"\npoisson = 0.3\ndensity = "7860 kg/m3"\nexpansion = "12e-6 1/K"'
-BODIES = f"""
-[scene]
-title = "Two blocks with all that may act on them"
-[materials.steel]
-{STEEL}
+BODIES = f"""{BLOCKS}
 [materials.fibre]
 young = ["140 GPa", "10 GPa", "9 GPa"]
 poisson = [0.3, 0.25, 0.2]
 shear = ["5 GPa", "4 GPa", "3 GPa"]
 density = "1600 kg/m3"
-[bodies.lower]
-part = "block"
-length = "100 mm"
-n_length = 3
-material = "steel"
-fixed = ["x_min"]
-[bodies.upper]
-part = "block"
-length = "40 mm"
-width = "14 mm"
-n_length = 1
-translation = ["30 mm", "3 mm", "10 mm"]
-material = "fibre"
-[contacts.lap]
-first = "upper.z_min"
-second = "lower.z_max"
-t1 = "x"
-tangential_stiffness = "100 N/um"
-normal_stiffness = "120 N/um"
-friction = 0.05
 [bolts.one]
 first = "upper.z_max"
 second = "lower.z_min"
 preload = "300 N"
 stiffness = "90 N/um"
+material = "steel"
 [springs.side]
 group = "upper.x_max"
 direction = "y"
@@ -83,9 +60,6 @@ stiffness = "2 N/um"
 [masses.tip]
 at = "lower.x_max"
 mass = "20 g"
-[loads.static.press]
-group = "upper.z_max"
-pressure = "0.5 MPa"
 [loads.static.weight]
 direction = "-z"
 acceleration = "900 m/s2"
@@ -95,19 +69,12 @@ speed = "300 rpm"
 [loads.static.warm]
 temperature = "5 K"
 bodies = ["lower"]
-[loads.harmonic.pull]
-group = "lower.x_max"
-direction = "x"
-value = "3 kN"
-[response]
-group = "lower.x_max"
-direction = "x"
-frequency = ["4 kHz", "7 kHz"]
-[reduction]
-modes = 6
-[damping]
-modal = "1 %"
 """
+COARSE = (
+    "bodies.lower.n_length=3", "bodies.upper.n_length=1", "bodies.upper.n_width=2", "bodies.upper.material=fibre",
+    "bodies.upper.translation=['30 mm', '3 mm', '10 mm']", "contacts.lap.friction=0.05", "harmonics=",
+    "loads.harmonic.pull.value=900 N", "response.frequency=['4 kHz', '7 kHz']",
+)  # fmt: skip
 BEAM = (
     "geometry.n_patch=3", "geometry.n_length=4", "geometry.n_height=1", "reduction.modes=4", "response.points=20",
     "wear.max_steps=4", "harmonics.kept=[0, 1]", "wear.tolerance=2 %", "wear.at=peak", "wear.motion=machine",
@@ -166,7 +133,7 @@ def bodies() -> Numbers:
     """Two bodies with an orthotropic material, bolt, spring, mass, pressure, weight, rotation and heat."""
     with TemporaryDirectory() as folder:
         place = Path(folder)
-        model = modelling.build(scene_file.parse(BODIES, "bodies.toml", (), place), Progress())
+        model = modelling.build(scene_file.parse(BODIES, "bodies.toml", COARSE, place), Progress())
     return _linear(model) | _response(model.balance, 2 * np.pi * 5500.0)
 
 

@@ -22,8 +22,8 @@ from proof.fuzzing.fuzz_damage import bytes_damaged, lines_damaged, tables_damag
 from proof.fuzzing.fuzz_runs import GOING, RUN, Command, FuzzEnd, Job, Runs
 from tests.helpers import foreign_files
 from tests.helpers.coarse_scenes import BEAM
+from tests.helpers.lap_deck import OWN, REST, TEXT
 from tests.helpers.matrix_scene import SCENE, matrix_folder
-from tests.helpers.pages import ROOT
 from tests.helpers.structures import BLOCKS
 from tribodyn.workflows.export.result_tables import DataKind, Function, function
 from tribodyn.workflows.result.number_format import write_columns
@@ -56,28 +56,6 @@ FIT = {
     "parameters": {"kt": {"keys": ["contact.tangential_stiffness"], "low": "200 N/um", "high": "900 N/um"}},
     "measured": {"mode": {"of": "stuck frequency", "mode": 1, "value": "420 Hz"}},
 }
-SEPARATE = (
-    "          0.,           0.,          10.\n          0.,"  # where the second block stands beside the first one
-)
-STACKED = "0., -10., 10.\n 0.,"  # where it stands upon it
-DECK = """
-[scene]
-title = "A deck"
-[decks.lap]
-file = "lap.inp"
-unit = "mm"
-[loads.harmonic.shake]
-group = "Block-2"
-direction = "y"
-value = "1 N"
-[response]
-group = "Block-2"
-direction = "y"
-frequency = ["1 kHz", "2 kHz"]
-points = 5
-[reduction]
-modes = 4
-"""
 ROWS = """
 [scene]
 title = "Two DOFs and the ground"
@@ -172,18 +150,15 @@ def _structures(folder: Path) -> list[Base]:
     (empty := folder / "empty").mkdir()
     (decks := folder / "decks").mkdir()
     (rows := folder / "rows").mkdir()
-    lap = (ROOT / "tests/geometry/decks/lap.inp").read_text(encoding="utf-8")
-    lap = lap.replace(SEPARATE, STACKED)
-    (decks / "lap.inp").write_text(lap, encoding="utf-8")
+    (decks / "lap.inp").write_text(TEXT, encoding="utf-8")
     matrix_folder(rows)
     (rows / "own.toml").unlink()
     small = (*QUIET[:3], "response.points=5")
-    scene = _scene("run deck", DECK, _run, small, decks)
+    scene = _scene("run deck", OWN + REST, _run, small, decks)
     return [
         _scene("run bodies", BLOCKS, _run, small, empty),
         scene,
-        replace(scene, kind="run deck damaged", files={**scene.files, "lap.inp": lap.encode()}, damaged="lap.inp",
-                tables=False),
+        replace(scene, kind="run deck damaged", damaged="lap.inp", tables=False),
         _scene("run matrices", SCENE, _run, (*QUIET, "response.points=6"), rows),
     ]  # fmt: skip
 
@@ -218,9 +193,7 @@ def _decks(folder: Path) -> list[Base]:
         for ending in (".inp", ".bdf", ".cdb", ".msh", ".vtu", ".med")
     }
     files[".cdb"] += b"MP,DENS,1,7860.\nMP,NUXY,1,.3\n"
-    files["_lap.inp"] = (
-        (ROOT / "tests/geometry/decks/lap.inp").read_bytes().replace(SEPARATE.encode(), STACKED.encode())
-    )
+    files["_lap.inp"] = TEXT.encode()
     for ending, content in files.items():
         words = ["inspect", f"own{ending}", "--unit", "mm", "--modes", "2"]
         if "lap" not in ending:

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 import tribodyn as td
+from tests.helpers.lap_deck import OWN, REST, TEXT
 from tests.helpers.pages import ROOT, fences
 from tribodyn.fem.factor import factorise
 from tribodyn.fem.modes import modes
@@ -16,25 +17,6 @@ from tribodyn.workflows.run.pipeline import part_mesh
 from tribodyn.workflows.scene import scene_file
 from tribodyn.workflows.studies import convergence
 
-LAP = (Path(__file__).parents[1] / "geometry" / "decks" / "lap.inp").read_text()
-# the deck's second block stands beside its first one: move it over
-PLACE = "          0.,           0.,          10.\n          0.,"
-TEXT = LAP.replace(PLACE, "0., -10., 10.\n 0.,")
-REST = """
-[scene]
-title = "A deck"
-[loads.harmonic.shake]
-group = "Block-2"
-direction = "y"
-value = "1 N"
-[response]
-group = "Block-2"
-direction = "y"
-frequency = ["1 kHz", "2 kHz"]
-[reduction]
-modes = 4
-"""
-OWN = '[decks.lap]\nfile = "lap.inp"\nunit = "mm"\n'
 DECK = OWN + 'elements = "quadratic"\n'
 BY_HAND = """
 [materials.Steel]

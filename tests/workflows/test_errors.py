@@ -102,16 +102,20 @@ def test_the_refined_mesh_is_that_of_a_finer_run(small: td.Result) -> None:
     ({"harmonics": 0.02, "samples": 0.01}, 2.5 * DEFAULT.floor + 1.25 * 0.03),
     ({"harmonics": 0.02, "mesh and contact grid": None}, None),
     ({"harmonics": None, "mesh and contact grid": 0.02}, None),
+    ({}, None),
 ])  # fmt: skip
 def test_a_total_error_is_no_less_than_each_of_its_rows(changes: dict[str, float | None], error: float | None) -> None:
-    table = [MeasuredChange(name, "energy", None, None, change, "") for name, change in changes.items()]
-    assert judgement.total_error(table, 2.0)[0] == (None if error is None else pytest.approx(error))
+    table = [MeasuredChange(name, "energy", None, None, change, "above the limit") for name, change in changes.items()]
+    total, reason = judgement.total_error(table, 2.0)
+    assert total == (None if error is None else pytest.approx(error))
+    assert (error is None and len(table) > 0) == (reason == "above the limit")
+
+
+def row(refinement: Refinement, relative: float, quantity: str = "life") -> MeasuredChange:
+    return MeasuredChange(refinement, quantity, None, None, relative, "")
 
 
 def test_the_scatter_of_a_motion_in_time_and_of_its_steps_is_the_least_change_that_counts() -> None:
-    def row(refinement: Refinement, relative: float) -> MeasuredChange:
-        return MeasuredChange(refinement, "life", None, None, relative, "")
-
     changes = [row(Refinement.COMBINED, 0.002), row(Refinement.WEAR_STEPS, 0.01)]
     assert judgement.total_error(changes, 0.7)[0] == 0.01 > DEFAULT.total(0.002, 0.7)
     assert judgement.total_error([changes[0], row(Refinement.WEAR_STEPS, 0.005)], 0.7)[0] == DEFAULT.total(0.002, 0.7)
@@ -138,18 +142,9 @@ def test_the_same_scene_has_the_same_errors_in_every_digit(small: td.Result) -> 
     assert replace(second, seconds=first.seconds) == first
 
 
-def test_an_error_that_nobody_measured_is_not_known() -> None:
-    row = MeasuredChange(Refinement.COMBINED, "energy", None, None, None, "above the limit")
-    assert judgement.total_error([row], None) == (None, "above the limit")
-    assert judgement.total_error([], None)[0] is None
-
-
 def test_a_life_is_dominated_by_what_changed_it_most() -> None:
-    def row(refinement: Refinement, quantity: str, change: float) -> MeasuredChange:
-        return MeasuredChange(refinement, quantity, None, None, change, "")
-
     for quantity, expected in (("life", Refinement.COMBINED), ("energy", Refinement.MESH)):
-        changes = [row(expected, quantity, 0.12), row(Refinement.WEAR_STEPS, quantity, 0.02)]
+        changes = [row(expected, 0.12, quantity), row(Refinement.WEAR_STEPS, 0.02, quantity)]
         assert judgement.dominating(changes) == expected
 
 
@@ -359,19 +354,18 @@ def search(accuracy_text: str, verdicts: list[Verdict]) -> tuple[ErrorBound, lis
     return accuracy.to_accuracy(file, accuracy_text, run, lambda sentence: None)[1], requested
 
 
-def test_only_what_contributes_is_refined() -> None:
-    rough = verdict_from({"harmonics": {"energy": 0.3}, "modes": {"energy": 1e-5}, "wear steps": {"life": 0.5}})
-    fine = verdict_from({"harmonics": {"energy": 0.003}, "modes": {"energy": 1e-4}})
-    bound, rounds = search("1 % of energy", [rough, fine])
+ROUGH = {"harmonics": {"energy": 0.3}, "modes": {"energy": 1e-5}, "wear steps": {"life": 0.5}}
+
+
+@pytest.mark.parametrize(("quantity", "changes", "refined"), [
+    ("energy", ROUGH, {"harmonics.kept", "harmonics.samples"}),
+    ("life", {"statistics of the motion": {"life": 0.3}}, {"wear.max_steps", "wear.tolerance"}),
+])  # fmt: skip
+def test_only_what_contributes_is_refined(quantity, changes, refined):
+    fine = verdict_from({"harmonics": {quantity: 0.003}, "modes": {quantity: 1e-4}})
+    bound, rounds = search(f"1 % of {quantity}", [verdict_from(changes), fine])
     assert bound.is_satisfied
-    changed = {text.partition("=")[0] for text in set(rounds[1]) - set(rounds[0])}
-    assert changed == {"harmonics.kept", "harmonics.samples"}
-
-
-def test_scatter_of_means_in_time_is_refined_by_the_wear_steps() -> None:
-    _, rounds = search("1 % of life", [verdict_from({"statistics of the motion": {"life": 0.3}})])
-    changed = {text.partition("=")[0] for text in set(rounds[1]) - set(rounds[0])}
-    assert changed == {"wear.max_steps", "wear.tolerance"}
+    assert {text.partition("=")[0] for text in set(rounds[1]) - set(rounds[0])} == refined
 
 
 def test_what_cannot_be_refined_is_named() -> None:

@@ -13,7 +13,7 @@ import pyvista as pv
 import xarray as xr
 from scipy.io import loadmat
 from vtkmodules.util.numpy_support import vtk_to_numpy
-from vtkmodules.vtkIOXML import vtkXMLPolyDataReader, vtkXMLUnstructuredGridReader
+from vtkmodules.vtkIOXML import vtkXMLPolyDataReader
 
 from tests.helpers.command import refusal
 from tests.helpers.nodes_of_pairs import node_of_pair
@@ -111,6 +111,10 @@ def test_paraview_reader_opens_the_series(series: Path) -> None:
     assert grid.n_cells == len(part.cells)
     np.testing.assert_allclose(grid.point_data["depth_on_this_face"][patch.nodes], 0.5 * wear.depth[8])
     np.testing.assert_array_equal(grid.point_data["displacement_b1"], synthetic.fields.displacement[2, ..., 2])
+    worn = grid.point_data["worn_off"]
+    np.testing.assert_allclose(grid.points - worn, part.points, atol=1e-15)
+    assert np.linalg.norm(worn, axis=1).max() == pytest.approx(0.5 * wear.depth[8].max())
+    assert grid.field_data["cycles"][0] == wear.cycles[8]
 
 
 def test_a_cycle_is_the_sum_of_its_harmonics(series: Path) -> None:
@@ -141,19 +145,6 @@ def test_the_contact_over_a_cycle_has_forces_and_status_of_its_instants(series: 
     )
     status = vtk_to_numpy(fields.GetArray("status_now"))
     np.testing.assert_array_equal(status, contact_states.instant_status(synthetic, 1)[:, sample])
-
-
-def test_vtk_itself_reads_the_worn_part(series: Path) -> None:
-    synthetic = result()
-    reader = vtkXMLUnstructuredGridReader()
-    reader.SetFileName(str(series / "part_wear" / "part_wear_0008.vtu"))
-    reader.Update()
-    grid = reader.GetOutput()
-    assert grid.GetNumberOfCells() == len(synthetic.part.cells)
-    worn = vtk_to_numpy(grid.GetPointData().GetArray("worn_off"))
-    np.testing.assert_allclose(vtk_to_numpy(grid.GetPoints().GetData()) - worn, synthetic.part.points, atol=1e-15)
-    assert np.linalg.norm(worn, axis=1).max() == pytest.approx(0.5 * synthetic.wear.depth[8].max())
-    assert vtk_to_numpy(grid.GetFieldData().GetArray("cycles"))[0] == synthetic.wear.cycles[8]
 
 
 def _read(listing: Path, number: int) -> pv.DataSet:

@@ -51,22 +51,6 @@ def found_again(scene, overrides, true, looked, measured):
     return fit.identification, fit.changes
 
 
-def test_contact_springs_and_friction_are_found_again():
-    true = ("contact.tangential_stiffness=300e6", "contact.friction=0.42")
-    searched = {
-        "k_t": {"keys": ["contact.tangential_stiffness"], "low": "100 N/um", "high": "1 N/nm"},
-        "mu": {"keys": ["contact.friction"], "low": 0.1, "high": 0.9, "ratio": False},
-    }
-    measured = {"mode": {"of": "stuck frequency", "mode": 1}, "energy": {"of": "energy", "at": "700 Hz", "load": 2.0}}
-    result, changes = found_again("beam", BEAM, true, searched, measured)
-    assert result.values == pytest.approx([300e6, 0.42], rel=1e-3)
-    assert result.origin == pytest.approx([470e6, 0.5])  # the scene's own, where it starts
-    assert changes[0].startswith("contact.tangential_stiffness=3")
-    assert changes[0].endswith(" N/m")
-    assert scene_file.read("beam", (*BEAM, *changes)).scene.contact.numbers["friction"] == pytest.approx(0.42, rel=1e-3)
-    assert abs(result.sensitivity[0, 1]) < 1e-9  # a stuck mode knows no friction
-
-
 def test_friction_of_a_scene_of_matrices_is_found_again(tmp_path):
     scene = str(matrix_folder(tmp_path) / "own.toml")
     searched = {"mu": {"keys": ["contact.friction"], "low": 0.1, "high": 0.8}}

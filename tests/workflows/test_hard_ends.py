@@ -24,7 +24,7 @@ TINY = ("harmonics.kept=[0, 1]",
         "verdict.enabled=false", "response.points=5")  # fmt: skip
 
 
-def test_every_flipped_byte_is_told(tmp_path: Path) -> None:
+def test_every_flipped_byte_and_a_result_cut_short_are_told(tmp_path: Path) -> None:
     path = tmp_path / "result.h5"
     store.save(path, synthetic_result.result())
     full = path.read_bytes()
@@ -37,12 +37,6 @@ def test_every_flipped_byte_is_told(tmp_path: Path) -> None:
             continue  # padding, which nobody reads
         with pytest.raises(store.ResultError):
             store.load(path)
-
-
-def test_a_result_cut_short_is_told(tmp_path: Path) -> None:
-    path = tmp_path / "result.h5"
-    store.save(path, synthetic_result.result())
-    full = path.read_bytes()
     for share in (0.0, 0.001, 0.3, 0.999):
         path.write_bytes(full[: int(share * len(full))])
         with pytest.raises(store.ResultError):
@@ -85,53 +79,6 @@ def test_a_full_disk_keeps_the_result_that_was_there(tmp_path: Path) -> None:
     assert done.returncode == 0, done.stderr
     assert done.stdout.strip() == synthetic_result.result().state
     assert [item.name for item in tmp_path.iterdir()] == ["result.h5"]
-
-
-GOES_ON = """
-import resource, sys
-from pathlib import Path
-from tests.helpers import killed_runs
-words = sys.argv[2:]
-if words[-1].isdigit():
-    resource.setrlimit(resource.RLIMIT_FSIZE, (int(words.pop()), resource.RLIM_INFINITY))
-killed_runs.go_on(Path(sys.argv[1]), tuple(words))
-"""
-
-
-@pytest.mark.slow
-def test_one_run_through_all_of_it_ends_as_if_nothing_had_happened(tmp_path: Path) -> None:
-    """Killed, its folder claimed by another run, its checkpoint damaged, its disk full; resumed, all the same."""
-    overrides = (
-        *TINY[:5], "verdict.enabled=false", "response.points=5", "wear.rule=thesis", "wear.step=1 um",
-        "wear.max_steps=4",
-    )  # fmt: skip
-    root, folder, path = Path(__file__).parents[2], tmp_path / "run", tmp_path / "run" / "result.h5"
-    folder.mkdir()
-    total = td.run("beam", tmp_path / "whole", overrides=overrides)
-    command = [sys.executable, "-c", GOES_ON, str(folder), *overrides]
-    process = subprocess.Popen(command, cwd=root)
-    began = time.monotonic()
-    while not path.exists() and time.monotonic() - began < 300:
-        time.sleep(0.02)
-    with pytest.raises(ValueError, match="another run is writing into"):
-        td.run("beam", folder, overrides=overrides)
-    process.kill()
-    process.wait()
-    saved = path.read_bytes()
-    damaged = bytearray(saved)
-    damaged[len(damaged) // 2] ^= 0x10
-    path.write_bytes(damaged)
-    with pytest.raises(store.ResultError):
-        store.load(path)
-    assert subprocess.run(command, cwd=root, capture_output=True, text=True, check=False).returncode != 0
-    path.write_bytes(saved)
-    full = subprocess.run([*command, str(3 * len(saved) // 4)], cwd=root, capture_output=True, text=True, check=False)
-    assert "cannot be written" in full.stderr
-    assert store.load(path).state  # what was there is there
-    assert subprocess.run(command, cwd=root, check=False).returncode == 0
-    resumed = store.load(path)
-    assert np.array_equal(resumed.wear.depth, total.wear.depth)
-    assert np.array_equal(resumed.wear.cycles, total.wear.cycles)
 
 
 @pytest.mark.parametrize("override", [

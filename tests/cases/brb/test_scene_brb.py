@@ -9,7 +9,6 @@ import pytest
 import scipy.linalg as sla
 
 import tribodyn as td
-from tests.helpers.browser import chromium, clicked_zoomed_and_turned
 from tests.helpers.command import printed_record, refusal
 from tribodyn.hbm import newton
 from tribodyn.hbm.continuation.nonlinear_modes import BackboneOptions, backbone
@@ -18,8 +17,6 @@ from tribodyn.workflows.run import modelling
 from tribodyn.workflows.run.progress import Progress
 from tribodyn.workflows.run.references import linear_references
 from tribodyn.workflows.scene import scene_file
-
-__all__ = ["chromium"]
 
 FORCE = 3 * 12249.0
 COARSE = [
@@ -149,13 +146,3 @@ def test_references_of_a_beam_that_hangs_free_are_those_of_its_dynamic_stiffness
             dynamic = stiffness - w**2 * system.mass + 1j * w * system.velocity_matrix
             expected = abs(system.outputs["response"] @ np.linalg.solve(dynamic, force))
             assert height[at] == pytest.approx(expected, rel=1e-4)
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("faces", ["plain", "flat"])
-def test_the_report_is_clicked_zoomed_and_turned(faces, chromium, tmp_path: Path, monkeypatch):
-    model, name = built(faces), SCENES[faces][0]
-    monkeypatch.setattr(modelling, "build", lambda file, *_: model)
-    inputs = "response.frequency=['174 Hz', '178 Hz']"
-    result = td.run(name, overrides=(*COARSE, "response.points=2", inputs, "verdict.enabled=false"))
-    clicked_zoomed_and_turned(chromium, name, result, tmp_path, monkeypatch)

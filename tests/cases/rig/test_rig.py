@@ -9,7 +9,7 @@ from scipy.linalg import eigh
 
 from proof import __main__ as cli
 from proof.cases.rig import cases as rig_cases, fit as rig_fit, published, table as rig_table
-from proof.cases.rig.cases import apart, in_time
+from proof.cases.rig.cases import in_time
 from proof.cases.rig.joints import Modes, joints_of
 from proof.cases.rig.model import Rig
 from proof.cases.rig.wear import wear_down
@@ -17,9 +17,7 @@ from tests.helpers.coarse_scenes import QUICK_RIG as QUICK, RIG as COARSE
 from tests.helpers.fits import STEP, fit_by_differences as fit
 from tribodyn.hbm.outcome import WearEnd
 from tribodyn.reduction.linear import stuck_stiffness
-from tribodyn.workflows.run import settings
 from tribodyn.workflows.run.joints import contact_stiffness
-from tribodyn.workflows.run.references import linear_references
 from tribodyn.workflows.scene import scene_file
 from tribodyn.workflows.studies.fits.identification import FitParameter, MeasuredNumber
 from tribodyn.workflows.studies.forces import forces
@@ -38,13 +36,6 @@ def joints():
 # ---- prescribed height ----
 
 
-def test_the_force_at_the_screws_is_the_preload(rig):
-    for height, force in ((rig.height, 0.0), (rig.height, 70.0), (0.5 * rig.height, 30.0)):
-        cycle = rig.with_height(height).with_force(force).cycle()
-        assert cycle.preload > 5.0
-        assert cycle.reaction == pytest.approx(cycle.preload, rel=1e-9)
-
-
 def test_forces_at_rest_leave_a_prescribed_height_to_what_holds_the_part():
     """Both contact faces are of the one part: what they give to it adds up to nothing."""
     (part,) = forces("rig_thesis", overrides=COARSE).bodies
@@ -53,24 +44,10 @@ def test_forces_at_rest_leave_a_prescribed_height_to_what_holds_the_part():
     assert np.abs(part.joints["contact"]).max() < 1e-9
 
 
-def test_no_interference_no_preload(rig):
-    for still in (rig.with_height(0.0).at_rest(), rig.with_mating_height(-1.001 * rig.height).at_rest()):
-        assert still.preload == pytest.approx(0.0, abs=1e-9)
-        assert still.reaction == pytest.approx(0.0, abs=1e-6)
-
-
 def test_platform_height_and_mating_height_are_the_same_interference(rig):
     raised, pushed = rig.with_height(rig.height + 2e-6).at_rest(), rig.with_mating_height(2e-6).at_rest()
     assert raised.preload == pytest.approx(pushed.preload, rel=1e-6)
     assert raised.preload > rig.at_rest().preload + 3.0
-
-
-def test_lost_contact_is_the_open_rig(rig):
-    references = linear_references(rig.model().balance, settings.OUTPUT, 2 * np.pi * 240, 2 * np.pi * 450)
-    assert apart(rig, references) < 1e-3
-    worn = rig.with_opening(np.full(rig.plain().interface.n_pair, 1e-4)).cycle()
-    assert worn.energy == 0.0
-    assert worn.preload == 0.0
 
 
 @pytest.mark.slow
