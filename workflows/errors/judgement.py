@@ -156,8 +156,8 @@ def _statement(quantity: StatedQuantity, table: ChangeTable, comparison: MotionD
     elif isinstance(comparison, MotionDifference) and not wears:
         names = comparison.differences if not sampled else (quantity.name,)  # no peak where the motion is another one
         if difference := comparison.contradicts({name: error for name in names}):
-            status = Status.UNSTABLE if comparison.spread > 0 else Status.CONTRADICTED
-            return Statement(value, error, dominated, status, f"of the contact before wear, by {difference:.1%}")
+            reason = f"of the contact before wear, by {difference:.1%}"
+            return Statement(value, error, dominated, comparison.status, reason)
     if singularity := unbounded(quantity, table):
         return Statement(value, None, dominated, Status.UNBOUNDED, singularity)
     if error is None:

@@ -18,7 +18,7 @@ from tribodyn.workflows.errors.operating_states import OperatingState, Values, w
 from tribodyn.workflows.errors.refinement_limits import RefinementLimits
 from tribodyn.workflows.result.answers import worn_contact
 from tribodyn.workflows.result.result import Result
-from tribodyn.workflows.result.verdict import MeasuredChange, Refinement
+from tribodyn.workflows.result.verdict import MeasuredChange, Refinement, Status
 from tribodyn.workflows.run import settings
 from tribodyn.workflows.scene.scene_file import SceneFile
 
@@ -48,6 +48,11 @@ class MotionDifference:
         bounds = {name: error for name, error in errors.items() if error is not None}
         sizes = {name: self.differences.get(name, 0.0) + self.error for name in bounds}
         return max((size for name, size in sizes.items() if size > bounds[name]), default=0.0)
+
+    @property
+    def status(self) -> Status:
+        """Of a quantity that is contradicted and has no value in its place."""
+        return Status.UNSTABLE if self.spread > 0 else Status.CONTRADICTED
 
 
 def is_checked(state: OperatingState, requested: bool | None, limits: RefinementLimits) -> bool:
