@@ -11,6 +11,7 @@ from tribodyn.fem.elasticity import assemble
 from tribodyn.fem.factor import factorise
 from tribodyn.fem.load_vectors import Centrifugal, Heating, NodalForce, Pressure
 from tribodyn.fem.material import Material
+from tribodyn.fem.modes import modes
 from tribodyn.fem.part import build
 from tribodyn.fem.stress import COLUMNS, ROWS, locate, nodal_stress, strain_row, stress_rows
 from tribodyn.hbm.fatigue import face_indicators, von_mises
@@ -59,6 +60,21 @@ def test_cantilever(tetrahedra):
     largest = np.abs(expected[interior]).max()
     np.testing.assert_allclose(result.tensor[interior, 0], expected[interior], atol=5e-3 * largest)
     np.testing.assert_allclose(von_mises(result.tensor[interior]), np.abs(expected[interior]), atol=1e-2 * largest)
+
+
+def test_cantilever_in_vibration():
+    """First mode of a slender bar, by Euler and Bernoulli: -E z w'' for a deflection w of its end."""
+    length, depth, k = 0.3, 0.004, 1.8751040687
+    mesh, sets = brick(np.linspace(0, length, 31), [0.0, 0.008], [-depth / 2, depth / 2])
+    part = build(mesh, sets, STEEL, [Clamp("x_min")], [], {}, {})
+    u = part.field(modes(part.system.stiffness, part.system.mass, 2)[1][:, 0])
+    x, _, z = mesh.doflocs
+    s, a = k * x / length, (np.cosh(k) + np.cos(k)) / (np.sinh(k) + np.sin(k))
+    bend = np.cosh(s) + np.cos(s) - a * (np.sinh(s) + np.sin(s))
+    tip = u[x == length, 2].mean() / (np.cosh(k) - np.cos(k) - a * (np.sinh(k) - np.sin(k)))
+    expected, inside = -STEEL.E * z * bend * tip * (k / length) ** 2, np.abs(x - length / 2) < 0.45 * length
+    tensor = nodal_stress(mesh, STEEL, u).tensor[inside, 0]
+    np.testing.assert_allclose(tensor, expected[inside], atol=5e-3 * np.abs(expected).max())
 
 
 def test_linear_field_is_exact_at_any_place():

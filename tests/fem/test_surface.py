@@ -26,13 +26,9 @@ def block(nx=2, ny=1, nz=1, tets=False):
         else skfem.MeshHex2.from_mesh(skfem.MeshHex.init_tensor(*axes))
     )
     return mesh.with_boundaries(
-        {
-            "left": lambda x: x[0] < 1e-9,
-            "right": lambda x: x[0] > 2 - 1e-9,
-            "bottom": lambda x: x[2] < 1e-9,
-            "top": lambda x: x[2] > 1 - 1e-9,
-        }
-    )
+        { "left": lambda x: x[0] < 1e-9, "right": lambda x: x[0] > 2 - 1e-9, "bottom": lambda x: x[2] < 1e-9,
+        "top": lambda x: x[2] > 1 - 1e-9, }
+    )  # fmt: skip
 
 
 def two_blocks(shift=0.0):

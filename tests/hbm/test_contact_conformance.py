@@ -273,11 +273,9 @@ def test_units_of_length_and_force_do_not_matter(name, components, length, unit_
         x, p, memory = draw(name, components, basis, 100, seed=11)
         units = {number.name: unit_scale(number.unit, length, unit_force) for number in contact_law.declared(name)}
         scaled = ContactParameters.of(
-            components,
-            p.stiffness * unit_force / length,
-            gap=p.gap * length,
+            components, p.stiffness * unit_force / length, gap=p.gap * length,
             **{key: value * units[key] for key, value in p.numbers.items()},
-        )
+        )  # fmt: skip
         first = aft.cycle(law, x, p, basis, memory)
         second = aft.cycle(law, x * length, scaled, basis, memory * length)
         np.testing.assert_allclose(second.force / unit_force, first.force, atol=1e-11)

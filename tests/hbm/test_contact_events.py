@@ -87,12 +87,10 @@ def stop(law: str) -> HarmonicBalance:
     """A mass that hits an elastic stop, twenty times stiffer than its spring, at less than its resonant amplitude."""
     parameters = ContactParameters.of(("n",), [[20.0]], gap=1.0)
     return HarmonicBalance.of(
-        oscillator(1.0, 1.0, 0.02, "n"),
-        Joint("contact", law, parameters),
+        oscillator(1.0, 1.0, 0.02, "n"), Joint("contact", law, parameters),
         HarmonicBasis((0, 1, 2, 3, 4, 5), 128, joint_transitions(Joint("contact", law, parameters))),
-        Excitation.of(harmonic={1: {"force": 0.1}}),
-        10.0,
-    )
+        Excitation.of(harmonic={1: {"force": 0.1}}), 10.0,
+    )  # fmt: skip
 
 
 def lifting(law: str) -> HarmonicBalance:

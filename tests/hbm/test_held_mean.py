@@ -148,12 +148,9 @@ def test_a_push_decides_where_sliders_just_reach_their_limit(monkeypatch: pytest
 
 def test_life_in_time_is_that_of_many_harmonics() -> None:
     problem = WearProblem(
-        balance=held(6.0, 9),
-        mission=(Duty(AtFrequency("tip", OMEGA)),),
-        wear=JointWear.of("energy", coefficient=1e-9),
-        area=np.full(3, 1e-4),
-        lost_below=0.5,
-    )
+        balance=held(6.0, 9), mission=(Duty(AtFrequency("tip", OMEGA)),),
+        wear=JointWear.of("energy", coefficient=1e-9), area=np.full(3, 1e-4), lost_below=0.5,
+    )  # fmt: skip
     with growth_by_few_modes():
         run = evolve(error_controlled.Rule(problem, Tolerance(0.01, 1e-4)))
     worn = evolve(error_controlled.Rule(problem, Tolerance(0.02, 1e-4), motion="time"))

@@ -98,12 +98,9 @@ def two_bodies() -> tuple[ReducedModel, ReducedModel, ReducedModel]:
     loads |= {f"{name}2": np.append(np.zeros(n), v) for name, v in second.loads.items()}
     outputs = {"tip1": loads["shake1"], "tip2": loads["shake2"]}
     system = SecondOrderSystem(
-        block(first.mass, second.mass),
-        block(first.stiffness, second.stiffness),
-        block(first.damping, second.damping),
-        loads,
-        outputs,
-    )
+        block(first.mass, second.mass), block(first.stiffness, second.stiffness),
+        block(first.damping, second.damping), loads, outputs,
+    )  # fmt: skip
     item = np.eye(6, n)
     return (
         ReducedModel(first, interface(item, ALL)),
@@ -226,11 +223,9 @@ def test_only_the_preload_of_wearing_joints_counts() -> None:
     full = wear_problem(lost_below=0.5)
     cut = split(full.balance, [np.arange(2), np.arange(2, N_PAIR)])
     problem = replace(
-        full,
-        balance=cut,
-        mission=(Duty(AtFrequency("tip", OMEGA)),),
+        full, balance=cut, mission=(Duty(AtFrequency("tip", OMEGA)),),
         wear={"part 1": JointWear.of("energy", coefficient=1e-9)},
-    )
+    )  # fmt: skip
     history = evolve(thesis.Rule(problem, 2e-5), max_steps=40)
     state = newton.solve_from_rest(cut, OMEGA).state
     assert history.preload[0] == pytest.approx(cut.preload_by_joint(state)["part 1"], rel=1e-6)

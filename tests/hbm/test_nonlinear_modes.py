@@ -28,12 +28,9 @@ def jenkins(n_samples: int = 8192) -> HarmonicBalance:
     parameters = ContactParameters.of(("t1", "n"), [[KT, KN]], friction=MU)
     excitation = Excitation.of({"normal": PRESS})
     return HarmonicBalance.of(
-        oscillator(MASS, STIFFNESS, RATIO),
-        Joint("contact", "jenkins", parameters),
-        HarmonicBasis((0, 1), n_samples),
-        excitation,
-        1000.0,
-    )
+        oscillator(MASS, STIFFNESS, RATIO), Joint("contact", "jenkins", parameters), HarmonicBasis((0, 1), n_samples),
+        excitation, 1000.0,
+    )  # fmt: skip
 
 
 SLIP = LIMIT / KT

@@ -122,11 +122,9 @@ def test_moving_ground_equals_the_motion_relative_to_it(samples):
     s = model.system
     extra = {
         f"ground {h} {part}": getattr(
-            -(s.stiffness + 1j * h * OMEGA * s.damping - (h * OMEGA) ** 2 * s.mass) @ ground[:, h], part
-        )
-        for h in (0, 1)
+        -(s.stiffness + 1j * h * OMEGA * s.damping - (h * OMEGA) ** 2 * s.mass) @ ground[:, h], part ) for h in (0, 1)
         for part in ("real", "imag")
-    }
+    }  # fmt: skip
     system = type(s)(s.mass, s.stiffness, s.damping, {**s.loads, **extra}, s.outputs)
     extra_loads = {(h, f"ground {h} {part}"): unit for h in (0, 1) for part, unit in (("real", 1.0), ("imag", 1j))}
     relative = balance_of(ReducedModel(system, model.interface), Excitation({**loads, **extra_loads}), samples=samples)

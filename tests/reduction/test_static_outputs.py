@@ -44,12 +44,10 @@ def random_part(seed: int, clamped: bool = True) -> Part:
     x = mesh.doflocs
     touching, pulled = draw.choice(["y0", "y1", "z0", "z1", "x1"], 2, replace=False)
     loads = {
-        "pull": NodalForce(pulled, draw.normal(size=3), "area"),
-        "pressure": Pressure(pulled),
-        "weight": BodyForce(draw.normal(size=3)),
-        "rotation": Centrifugal(draw.normal(size=3), (0.1, 0.0, 0.0)),
+        "pull": NodalForce(pulled, draw.normal(size=3), "area"), "pressure": Pressure(pulled),
+        "weight": BodyForce(draw.normal(size=3)), "rotation": Centrifugal(draw.normal(size=3), (0.1, 0.0, 0.0)),
         "heat": Heating(MATERIAL, (), 1 + 10 * draw.normal(size=3) @ x),
-    }
+    }  # fmt: skip
     outputs = {f"output {i}": NodalForce(face, draw.normal(size=3)) for i, face in enumerate((pulled, pulled, "x1"))}
     return build(
         mesh, {name: np.flatnonzero(face(x)) for name, face in faces.items()}, MATERIAL,

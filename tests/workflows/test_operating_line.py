@@ -11,6 +11,7 @@ from tribodyn.hbm.balance import HarmonicBalance
 from tribodyn.hbm.continuation.methods import arc_length
 from tribodyn.hbm.continuation.resonance_peak import AtPeak
 from tribodyn.hbm.linear import travelling_wave as waves
+from tribodyn.hbm.quantity import SolvedCycle, quantity_named
 from tribodyn.workflows.run import modelling
 from tribodyn.workflows.run.progress import Progress
 from tribodyn.workflows.run.references import linear_references
@@ -46,9 +47,7 @@ def test_a_line_of_speeds_is_the_whole_wheel_at_each(sectors, order, hertz, law)
     than 1e-4 at 32 samples: it gets samples that go into all sectors"""
     low, high = hertz
     samples = 32 * (sectors if law == "coulomb_planar" else 1)
-    span = (
-        f'response.frequency=["{low} Hz", "{high} Hz"]', f'contact.law="{law}"', f"harmonics.samples={samples}"
-    )  # fmt: skip
+    span = (f'response.frequency=["{low} Hz", "{high} Hz"]', f'contact.law="{law}"', f"harmonics.samples={samples}")
     item = line(sectors, order, *span)
     for f in (0.5 * (low + high), high - 1.0):
         base = (*LINE[1:], f"wheel.engine_order={order}", f'wheel.speed="{f / abs(order)} Hz"', *span)
@@ -62,6 +61,20 @@ def test_a_line_of_speeds_is_the_whole_wheel_at_each(sectors, order, hertz, law)
             expected = waves.at_sector(item.basis, outputs[0], order, sectors, n)
             miss = result[names.index(f"response@{n}")] - expected
             assert np.abs(miss).max() < 1e-4 * np.abs(expected).max()
+
+
+def test_stress_on_a_line_is_that_at_each_speed():
+    strength = ('fatigue.material.endurance_limit="200 MPa"', 'fatigue.material.strength="600 MPa"')
+    place, span = "stress.places.disk.point=[0.0237, 0.0, 0.0484]", 'response.frequency=["240 Hz", "264 Hz"]'
+    numbers = []
+    for speed in (LINE[0], 'wheel.speed="123 Hz"'):
+        file = scene(5, speed, *LINE[1:], "wheel.engine_order=-2", span, place, *strength)
+        balance = modelling.build(file, Progress()).balance
+        state = arc_length.solve_along_load(balance, 2 * np.pi * 246, EXACT).state
+        cycle = SolvedCycle.of(balance, state, "response")
+        numbers.append([quantity_named(name).value(cycle) for name in ("stress", "utilisation")])
+    np.testing.assert_allclose(*numbers, rtol=1e-5)
+    assert numbers[0][0] > 1e7
 
 
 def test_the_peak_of_a_line_is_where_it_meets_a_mode():
