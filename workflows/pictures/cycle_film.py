@@ -11,7 +11,7 @@ from tribodyn.workflows.pictures.figures import heading, length_unit, scale_bar,
 from tribodyn.workflows.pictures.loop_plots import loop_of, loop_size
 from tribodyn.workflows.pictures.matplotlib_names import BoundaryNorm, Figure, ListedColormap, Swatch, mpl
 from tribodyn.workflows.pictures.render import MovingPart
-from tribodyn.workflows.pictures.shots import shoot, show, with_room
+from tribodyn.workflows.pictures.shots import shoot, show
 from tribodyn.workflows.pictures.theme import BLUE, INK, LAYOUT, MOTION_MAP, RED, STATUS, STYLE
 from tribodyn.workflows.result.contact_states import instant_status, over_a_cycle, shown_states
 from tribodyn.workflows.result.result import Result
@@ -67,9 +67,7 @@ class CycleFilm:
         """Put an instant into the figure."""
         sample = number * self._status.shape[1] // self.count
         for axes, image in zip(self._panels, self._shots(number, sample), strict=True):
-            padded = np.full(axes.images[0].get_array().shape, 255, np.uint8)
-            padded[: LAYOUT.film_part[1]] = image
-            axes.images[0].set_data(padded)
+            axes.images[0].set_data(image)
         x, force = self._loop.displacement, self._loop.force
         self._mark.set_data(x[sample : sample + 1], force[sample : sample + 1])
         share = number / self.count
@@ -94,15 +92,13 @@ class CycleFilm:
 
     def _start(self, figure: Any, views: list[str]) -> None:
         for axes, name, image in zip(self._panels, views, self._shots(0, 0), strict=True):
-            (shown,), corner = with_room([image])
+            show(axes, image)
             if name == "part" and self._moving is not None:
-                show(axes, shown, self._moving.camera, "xyz", corner)
                 unit, factor = length_unit(self._top)
                 label = f"distance from the mean position / {unit}"
                 scale_bar(figure, axes, MOTION_MAP, 0.0, factor * self._top, label)
                 axes.set_title(self._moving.factors(self._factor))
             elif self._contact is not None:
-                show(axes, shown, self._contact.camera, book.AXES, corner)
                 axes.set_title(f"opened {self._contact.sides}")
 
     def _shots(self, number: int, sample: int) -> list[np.ndarray]:
@@ -117,7 +113,7 @@ class CycleFilm:
             contact_state = self._contact.restrict(self.state)
             paint = book.StatusPaint(self._status[self._contact.contact.pairs, sample])
             view = self._contact.view(contact_state.depth, self._wear, paint)
-            images.append(shoot(view, self._contact.camera, LAYOUT.film_part))
+            images.append(shoot(view, self._contact.camera, LAYOUT.film_part, book.AXES))
         return images
 
     def _draw_loop(self, axes: Any) -> None:

@@ -18,7 +18,7 @@ from tribodyn.workflows.pictures.figures import (
     status_legend,
 )
 from tribodyn.workflows.pictures.matplotlib_names import Figure, Image, ImageDraw, mpl
-from tribodyn.workflows.pictures.shots import Camera, Layer, View, frame, place, shoot, show, trimmed, with_room
+from tribodyn.workflows.pictures.shots import Camera, Layer, View, frame, place, shoot, show, trimmed
 from tribodyn.workflows.pictures.theme import INK, LAYOUT, MOTION_MAP, PRESSURE_MAP, RED, STYLE, WEAR_MAP
 from tribodyn.workflows.result.contact_states import ContactState, has_states, shown_states
 from tribodyn.workflows.result.faces import Meeting, bodies, meetings_of, worn_off
@@ -106,14 +106,14 @@ def _columns(
     head: str,
 ) -> Figure:
     """Images of the moving part side by side, with their titles and colours, and their scale bars."""
-    images, corner = with_room(trimmed(images))
+    images = trimmed(images)
     with mpl.rc_context({**STYLE, "axes.grid": False}):
         wide = max(LAYOUT.column, LAYOUT.least / len(images))
         tall = wide * images[0].shape[0] / images[0].shape[1]
         figure = Figure(figsize=(wide * len(images) + 0.2, tall + 2.0), layout="constrained")
         columns = np.atleast_1d(figure.subplots(1, len(images)))
         for axes, image, (title, color), bar in zip(columns, images, titles, bars, strict=True):
-            show(axes, image, moving.camera, "xyz", corner)
+            show(axes, image)
             axes.set_title(title, color=color)
             scale_bar(figure, axes, *bar)
         heading(figure, moving.result, head)
@@ -134,11 +134,10 @@ def contact_picture(result: Result, contact: Meeting, wear: float | None = None)
         )
         grid = figure.subplots(len(rows), len(states), squeeze=False)
         painted = [[_painted(opened, state, name, wear) for state in states] for name in rows]
-        shots = [shoot(view, opened.camera, LAYOUT.book) for line in painted for view, _ in line]
-        images, corner = with_room(trimmed(shots))
+        images = trimmed([shoot(view, opened.camera, LAYOUT.book, book.AXES) for line in painted for view, _ in line])
         bars = [bar for line in painted for _, bar in line]
         for axes, image, bar in zip(grid.ravel(), images, bars, strict=True):
-            show(axes, image, opened.camera, book.AXES, corner)
+            show(axes, image)
             if bar is not None:
                 scale_bar(figure, axes, *bar)
         for axes, state in zip(grid[0], states, strict=True):

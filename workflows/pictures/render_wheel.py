@@ -13,7 +13,7 @@ from tribodyn.hbm.linear.travelling_wave import at_sector
 from tribodyn.workflows.pictures import view as drawing
 from tribodyn.workflows.pictures.figures import heading, length_unit, present, scale_bar
 from tribodyn.workflows.pictures.matplotlib_names import Figure, mpl
-from tribodyn.workflows.pictures.shots import Layer, View, frame, shoot, show, with_room
+from tribodyn.workflows.pictures.shots import Layer, View, frame, shoot, show
 from tribodyn.workflows.pictures.theme import LAYOUT, MOTION_MAP, STYLE
 from tribodyn.workflows.result.contact_states import shown_states
 from tribodyn.workflows.result.model_facts import Around
@@ -60,8 +60,7 @@ def wheel_picture(result: Result, wheel: Around, deformation: float | None = Non
             largest = float(np.linalg.norm(motion, axis=-1).max())
             scale = deformation or drawing.deformation_scale(drawing.swing(wave, result.harmonics), 2 * blades.size)
             static = (part.points + drawing.at_rest(wave, result.harmonics))[blades.nodes]
-            (image,), corner = with_room([blades.shot(static, motion[:, blades.nodes], scale, largest)])
-            show(axes, image, blades.camera, "xyz", corner)
+            show(axes, blades.shot(static, motion[:, blades.nodes], scale, largest))
             axes.set_title(f"{state.label}\nvibration × {scale:g}")
             unit, factor = length_unit(largest)
             scale_bar(figure, axes, MOTION_MAP, 0.0, factor * largest, f"vibration at one instant / {unit}")

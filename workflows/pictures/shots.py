@@ -1,7 +1,7 @@
-"""Single views of surfaces, drawn off-screen with pyvista and returned as images, and their axes drawn by matplotlib.
+"""Single views of surfaces with their axes, drawn off-screen with pyvista and returned as images.
 
-A coloured surface is drawn without shading, so that its colours are those of its scale; edges show its shape. The axes
-of a view stand in a corner of the image that is empty. pyvista is imported by the functions here."""
+A coloured surface is drawn without shading, so that its colours are those of its scale; edges show its shape. pyvista
+is imported by the functions here."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
@@ -10,10 +10,9 @@ from typing import Any
 import numpy as np
 
 from tribodyn.extras import package
-from tribodyn.workflows.pictures.theme import BLUE, BODY, EDGE, GREEN, LAYOUT, PAPER, RED
+from tribodyn.workflows.pictures.theme import BLUE, BODY, EDGE, GREEN, INK, PAPER, RED
 
 SHADE = {"ambient": 0.45, "diffuse": 0.6, "specular": 0.0}
-OF_AXES = (RED, GREEN, BLUE)
 
 
 @dataclass(frozen=True)
@@ -51,8 +50,8 @@ class View:
     lines: list[Any] = field(default_factory=list)
 
 
-def shoot(view: View, camera: Camera, size: tuple[int, int] = (960, 720)) -> np.ndarray:
-    """(height, width, 3) image of a view, 8 bits a colour."""
+def shoot(view: View, camera: Camera, size: tuple[int, int] = (960, 720), names: Sequence[str] = "xyz") -> np.ndarray:
+    """(height, width, 3) image of a view, 8 bits a colour; names : of its axes, which stand in a corner."""
     pv = package("pyvista")
 
     plotter = pv.Plotter(off_screen=True, window_size=list(size), lighting="none")
@@ -84,6 +83,9 @@ def shoot(view: View, camera: Camera, size: tuple[int, int] = (960, 720)) -> np.
     plotter.camera.up = camera.up
     plotter.camera.parallel_scale = camera.reach
     plotter.camera.clipping_range = (0.01 * camera.reach, 40 * camera.reach)
+    colors = {f"{axis}_color": color for axis, color in zip("xyz", (RED, GREEN, BLUE), strict=True)}
+    labels = {f"{axis}label": name for axis, name in zip("xyz", names, strict=True)}
+    plotter.add_axes(line_width=5, viewport=(0, 0, 0.3, 0.3), label_size=(0.3, 0.12), color=INK, **colors, **labels)
     image = np.asarray(plotter.screenshot(return_img=True))[..., :3]
     plotter.close()
     return image
@@ -121,64 +123,7 @@ def place(camera: Camera, point: np.ndarray, size: tuple[int, int]) -> tuple[flo
     return 0.5 + x * size[1] / size[0], 0.5 - y
 
 
-def with_room(images: Sequence[np.ndarray]) -> tuple[list[np.ndarray], tuple[float, float]]:
-    """Images of one size with an empty corner for the axes, a strip added below where they have none.
-
-    Returns the images and the middle of the corner's box [pixels]"""
-    box = room(images[0])
-    ink = np.any([image.min(axis=2) < 250 for image in images], axis=0)
-    height, width = ink.shape
-    for top, left_edge in ((height - box, 0), (height - box, width - box), (0, 0), (0, width - box)):
-        if not ink[top : top + box, left_edge : left_edge + box].any():
-            return list(images), (left_edge + box / 2, top + box / 2)
-    strip = np.full((box, width, 3), 255, np.uint8)
-    return [np.concatenate([image, strip]) for image in images], (box / 2, height + box / 2)
-
-
-def room(image: np.ndarray) -> int:
-    """Side of the box that the axes of an image stand in [pixels]."""
-    smaller, larger = LAYOUT.axes_box
-    return round(max(smaller * min(image.shape[:2]), larger * max(image.shape[:2])))
-
-
-def show(axes: Any, image: np.ndarray, camera: Camera, names: Sequence[str], corner: tuple[float, float]) -> None:
-    """Show an image of a camera with its axes, drawn around a corner [pixels]."""
+def show(axes: Any, image: np.ndarray) -> None:
+    """Show an image, without a frame."""
     axes.imshow(image)
     axes.axis("off")
-    draw_axes(axes, camera, names, corner, room(image))
-
-
-def draw_axes(axes: Any, camera: Camera, names: Sequence[str], middle: tuple[float, float], box: float) -> None:
-    """Draw the axes of a view on its image; one that is seen from its end is a dot.
-
-    names : of the three axes; middle, box : where they stand, and how much room they have [pixels]"""
-    right, towards = np.cross(camera.up, camera.towards), np.asarray(camera.towards)
-    projected = np.column_stack([right, -np.asarray(camera.up)])  # pixels count downwards
-    length = np.linalg.norm(projected, axis=1)[:, None]
-    long = length > LAYOUT.axes_dot
-    opposite = -projected.sum(axis=0) / max(float(np.linalg.norm(projected.sum(axis=0))), 1e-9)
-    outwards = np.where(long, projected / np.maximum(length, 1e-9), opposite)
-    start = np.asarray(middle) - 0.28 * box * np.clip(projected.sum(axis=0), -1, 1)
-    ends = start + 0.5 * box * projected
-    labels = _spread(start + (0.5 * length + 0.17) * box * outwards, 0.24 * box)
-    for i in np.argsort(towards):  # what points to the reader comes last
-        if long[i]:
-            arrow = {"arrowstyle": "-|>", "color": OF_AXES[i], "lw": 1.3, "shrinkA": 0, "shrinkB": 0}
-            axes.annotate("", ends[i], start, arrowprops=arrow, annotation_clip=False)
-        else:
-            axes.plot(*start, "o", color=OF_AXES[i], ms=4)
-        axes.text(*labels[i], names[i], color=OF_AXES[i], fontsize=9, ha="center", va="center", fontstyle="italic")
-
-
-def _spread(places: np.ndarray, least: float) -> np.ndarray:
-    """Places (3, 2) moved until no two are nearer than a distance."""
-    places = places.copy()
-    for _ in range(30):
-        for i, j in ((0, 1), (1, 2), (0, 2)):
-            between = places[j] - places[i]
-            distance = float(np.linalg.norm(between))
-            if distance < least:
-                direction = between / distance if distance > 1e-9 else np.array([1.0, 0.0])
-                places[i] -= direction * (least - distance) / 2
-                places[j] += direction * (least - distance) / 2
-    return places

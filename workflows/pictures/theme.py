@@ -40,8 +40,6 @@ class Layout:
     film : inches of a film; film_part, film_contact : pixels of the views in it; rate : images per second of a film
     images : of a film, fewer where there are fewer wear steps; samples : instants of a cycle in maps of its motion
     instants : of a cycle, among which that of the largest swing is found
-    axes_box : side of the box that the axes of a view stand in, of the smaller and of the larger side of its image
-    axes_dot : of its length, below which an axis seen from its end is a dot
     ringed : of the width of a view, below which a contact is ringed
     smooth : subdivisions of the faces of curved elements
     lift : of the size of a contact, by which colours lie above it
@@ -66,8 +64,6 @@ class Layout:
     images: int = 48
     samples: int = 256
     instants: int = 64
-    axes_box: tuple[float, float] = (0.2, 0.14)
-    axes_dot: float = 0.2
     ringed: float = 0.07
     smooth: int = 2
     lift: float = 4e-3

@@ -16,7 +16,7 @@ from tribodyn.workflows.pictures.figures import (
     status_legend,
 )
 from tribodyn.workflows.pictures.matplotlib_names import Figure, mpl
-from tribodyn.workflows.pictures.shots import shoot, show, with_room
+from tribodyn.workflows.pictures.shots import shoot, show
 from tribodyn.workflows.pictures.theme import BLUE, LAYOUT, ORANGE, PRESSURE_MAP, RED, STYLE, WEAR_MAP
 from tribodyn.workflows.pictures.view import wear_scale
 from tribodyn.workflows.pictures.wear_plots import cycle_axis
@@ -57,7 +57,9 @@ class WearFilm:
             self._bars(upper)
             self._marks = _curves(result, lower.subplots(1, 3), rows)
             heading(self.figure, result, f"wear of the {self.contact.sides}, relief × {self.scale:g}")
-            self._start()
+            for name, axes in self._panels.items():
+                show(axes, self._shot(self.states[-1], name))
+                axes.set_title(" ")
 
     @property
     def count(self) -> int:
@@ -71,22 +73,14 @@ class WearFilm:
         """Put a state into the figure."""
         state = self.states[number]
         for name, axes in self._panels.items():
-            image = np.full(axes.images[0].get_array().shape, 255, np.uint8)
-            image[: LAYOUT.film_contact[1]] = self._shot(state, name)
-            axes.images[0].set_data(image)
+            axes.images[0].set_data(self._shot(state, name))
         self._panels["depth"].set_title(state.label)
         for mark, x, y in self._marks:
             mark.set_data(x[number : number + 1], y[number : number + 1])
 
-    def _start(self) -> None:
-        images, corner = with_room([self._shot(self.states[-1], name) for name in PANELS])
-        for axes, image in zip(self._panels.values(), images, strict=True):
-            show(axes, image, self.contact.camera, book.AXES, corner)
-            axes.set_title(" ")
-
     def _shot(self, state: ContactState, name: str) -> np.ndarray:
         view = self.contact.view(state.depth, self.scale, self._paint(state, name))
-        return shoot(view, self.contact.camera, LAYOUT.film_contact)
+        return shoot(view, self.contact.camera, LAYOUT.film_contact, book.AXES)
 
     def _paint(self, state: ContactState, name: str) -> book.Paint:
         if name == "status":
