@@ -7,28 +7,18 @@ from collections.abc import Sequence
 from contextlib import ExitStack
 from os import PathLike
 from pathlib import Path
-from typing import Literal, Protocol
+from typing import Literal
 
 from tribodyn.extras import package
 from tribodyn.refusal import Refusal
 from tribodyn.workflows.pictures.cycle_film import CycleFilm
-from tribodyn.workflows.pictures.matplotlib_names import FFMpegWriter, Figure, mpl
+from tribodyn.workflows.pictures.matplotlib_names import FFMpegWriter, mpl
 from tribodyn.workflows.pictures.offscreen import check
 from tribodyn.workflows.pictures.theme import LAYOUT, STYLE
 from tribodyn.workflows.pictures.wear_film import WearFilm
 from tribodyn.workflows.result.result import Result
 
 FORMATS = ("mp4", "gif")
-
-
-class FilmFigure(Protocol):
-    """A figure that shows one image of a film after the other."""
-
-    figure: Figure
-
-    @property
-    def count(self) -> int: ...
-    def show(self, number: int) -> None: ...
 
 
 def film(
@@ -57,7 +47,7 @@ def film(
     return encode(new_film, place / new_film.name, formats, dpi)
 
 
-def encode(film: FilmFigure, stem: Path, formats: Sequence[str], dpi: int = LAYOUT.film_dpi) -> list[Path]:
+def encode(film: WearFilm | CycleFilm, stem: Path, formats: Sequence[str], dpi: int = LAYOUT.film_dpi) -> list[Path]:
     """Write a film in some formats, all images with the layout of the first; its paths.
 
     Raises  Refusal: a format that is not known, or no encoder"""

@@ -4,18 +4,22 @@ Body 1 is not moved; body 2, or the ground where that is not meshed, is turned b
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 
 from tribodyn.extras import package
-from tribodyn.workflows.pictures.shots import Camera, Layer, View, frame
+from tribodyn.workflows.pictures.shots import Camera, Layer, frame
 from tribodyn.workflows.pictures.theme import BODY, BODY_2, EDGE, LAYOUT, STATUS
 from tribodyn.workflows.pictures.view import grid_of, polygons
 from tribodyn.workflows.result.contact_states import ContactState
 from tribodyn.workflows.result.faces import Face, Meeting, bodies, meetings_of
 from tribodyn.workflows.result.result import PartMesh, Patch, Result
+
+Paint = Callable[[Patch, np.ndarray], list[Layer]]
+"""Layers that show something on a face whose pairs lie at points (n_pair, 3)."""
 
 AXES = ("t1", "t2", "n")
 MARGIN = 0.35  # of the size of the patch, what is shown around it
@@ -51,9 +55,9 @@ class OpenedContact:
         """A state, of this contact's pairs."""
         return state.of(self.contact.pairs)
 
-    def view(self, depth: np.ndarray, scale: float, paint: Paint) -> View:
+    def view(self, depth: np.ndarray, scale: float, paint: Paint) -> list[Layer]:
         """Both faces worn by a depth (n_pair,) that is drawn `scale` times as large, and painted."""
-        contact, layers = self.contact, []
+        contact, layers = self.contact, list[Layer]()
         for number, share in enumerate((self.split, 1 - self.split)):
             face = contact.faces[number] if number < len(contact.faces) else None
             block = self._block(face, number == 0, scale * depth)
@@ -65,7 +69,7 @@ class OpenedContact:
                 points = self._turned(points, 1)
             layers.append(Layer(block.extract_surface(algorithm="dataset_surface"), color=(BODY, BODY_2)[number]))
             layers += paint(contact.patch, points)
-        return View(layers)
+        return layers
 
     def _turned(self, points: np.ndarray, sign: int) -> np.ndarray:
         """Points of body 2 after it is opened; sign : -1 where their n still points as body 1's does."""
@@ -94,12 +98,6 @@ class OpenedContact:
         grid = grid_of(part, local, cells)
         cut = grid.clip_box((x0, x1, y0, y1, -THICK * self.size, THICK * self.size), invert=False)
         return cut if cut.n_points else self._block(None, is_below, depth)
-
-
-class Paint(Protocol):
-    """Layers that show something on a face whose pairs lie at points (n_pair, 3)."""
-
-    def __call__(self, patch: Patch, points: np.ndarray) -> list[Layer]: ...
 
 
 @dataclass(frozen=True)

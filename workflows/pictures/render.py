@@ -18,8 +18,8 @@ from tribodyn.workflows.pictures.figures import (
     status_legend,
 )
 from tribodyn.workflows.pictures.matplotlib_names import Figure, Image, ImageDraw, mpl
-from tribodyn.workflows.pictures.shots import Camera, Layer, View, frame, place, shoot, show, trimmed
-from tribodyn.workflows.pictures.theme import INK, LAYOUT, MOTION_MAP, PRESSURE_MAP, RED, STYLE, WEAR_MAP
+from tribodyn.workflows.pictures.shots import Camera, Layer, frame, place, shoot, show, trimmed
+from tribodyn.workflows.pictures.theme import INK, LAYOUT, MOTION_MAP, PALE, PRESSURE_MAP, RED, STYLE, WEAR_MAP
 from tribodyn.workflows.result.contact_states import ContactState, has_states, shown_states
 from tribodyn.workflows.result.faces import Meeting, bodies, meetings_of, worn_off
 from tribodyn.workflows.result.result import Result
@@ -152,7 +152,7 @@ def contact_picture(result: Result, contact: Meeting, wear: float | None = None)
 
 def _painted(
     contact: book.OpenedContact, state: ContactState, name: str, wear: float
-) -> tuple[View, tuple[Any, ...] | None]:
+) -> tuple[list[Layer], tuple[Any, ...] | None]:
     """The opened contact showing one quantity of a state, and the scale bar that goes with it."""
     if name == "status":
         none = np.zeros(len(state.depth), int)
@@ -251,10 +251,10 @@ class MovingPart:
 
     def view(
         self, points: np.ndarray, values: np.ndarray, limits: tuple[float, float], colors: str = MOTION_MAP
-    ) -> View:
+    ) -> list[Layer]:
         """The part with its nodes at points (n_node, 3), coloured by values of the nodes."""
         grid = drawing.grid_of(self.part, points)
         grid.point_data["shown"] = values
         body = drawing.surface(grid, LAYOUT.smooth)
-        layers = [Layer(body, values=np.asarray(body.point_data["shown"]), map=colors, limits=limits)]
-        return View(layers, [self.outline])
+        outline = Layer(self.outline, PALE, edges=False, flat=True)
+        return [Layer(body, values=np.asarray(body.point_data["shown"]), map=colors, limits=limits), outline]

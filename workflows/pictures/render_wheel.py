@@ -13,7 +13,7 @@ from tribodyn.hbm.linear.travelling_wave import at_sector
 from tribodyn.workflows.pictures import view as drawing
 from tribodyn.workflows.pictures.figures import heading, length_unit, present, scale_bar
 from tribodyn.workflows.pictures.matplotlib_names import Figure, mpl
-from tribodyn.workflows.pictures.shots import Layer, View, frame, shoot, show
+from tribodyn.workflows.pictures.shots import Layer, frame, shoot, show
 from tribodyn.workflows.pictures.theme import LAYOUT, MOTION_MAP, STYLE
 from tribodyn.workflows.result.contact_states import shown_states
 from tribodyn.workflows.result.model_facts import Around
@@ -44,7 +44,7 @@ class BladeSurface:
         surface = package("pyvista").PolyData(positions, self._faces)
         values = np.linalg.norm(motion, axis=2).ravel()
         layer = Layer(surface, values=values, map=MOTION_MAP, limits=(0.0, largest), edges=False)
-        return shoot(View([layer]), self.camera, LAYOUT.wheel)
+        return shoot([layer], self.camera, LAYOUT.wheel)
 
 
 def wheel_picture(result: Result, wheel: Around, deformation: float | None = None) -> Figure:

@@ -4,7 +4,7 @@ A coloured surface is drawn without shading, so that its colours are those of it
 is imported by the functions here."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -42,22 +42,16 @@ class Camera:
     reach: float
 
 
-@dataclass(frozen=True)
-class View:
-    """Layers, and edges besides them."""
-
-    layers: list[Layer]
-    lines: list[Any] = field(default_factory=list)
-
-
-def shoot(view: View, camera: Camera, size: tuple[int, int] = (960, 720), names: Sequence[str] = "xyz") -> np.ndarray:
+def shoot(
+    view: Sequence[Layer], camera: Camera, size: tuple[int, int] = (960, 720), names: Sequence[str] = "xyz"
+) -> np.ndarray:
     """(height, width, 3) image of a view, 8 bits a colour; names : of its axes, which stand in a corner."""
     pv = package("pyvista")
 
     plotter = pv.Plotter(off_screen=True, window_size=list(size), lighting="none")
     plotter.set_background(PAPER)
     plotter.add_light(pv.Light(light_type="headlight", intensity=1.0))
-    for layer in view.layers:
+    for layer in view:
         if not layer.mesh.n_points:
             continue
         if layer.values is None:
@@ -74,8 +68,6 @@ def shoot(view: View, camera: Camera, size: tuple[int, int] = (960, 720), names:
             sharp = layer.mesh.extract_feature_edges(30, manifold_edges=False, non_manifold_edges=False)
             if sharp.n_points:
                 plotter.add_mesh(sharp, color=EDGE, line_width=1.6, lighting=False)
-    for line in view.lines:
-        plotter.add_mesh(line, color="#9aa1ab", line_width=1.2, lighting=False)
     plotter.enable_parallel_projection()
     plotter.enable_anti_aliasing("ssaa")
     plotter.camera.focal_point = camera.centre
