@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from tests.helpers.contact_draws import CLOSED_FORMS, HARMONICS, law_id
-from tests.helpers.verification_models import oscillator, slab
-from tribodyn.fem.interface import ContactInterface
+from tests.helpers.continuation_models import pressed_slab
+from tests.helpers.verification_models import oscillator
 from tribodyn.hbm import newton
 from tribodyn.hbm.balance import HarmonicBalance
 from tribodyn.hbm.contact import contact_law, event_cycle
@@ -93,18 +93,8 @@ def stop(law: str) -> HarmonicBalance:
     )  # fmt: skip
 
 
-def lifting(law: str) -> HarmonicBalance:
-    """Four pairs with friction that slide, rock and lift: six folds within the first resonance."""
-    model = slab(2, 2, ratio=0.01)
-    assert isinstance(model.interface, ContactInterface)
-    parameters = ContactParameters.of(("t1", "t2", "n"), model.interface.stiffness(4e6, 6e6), friction=0.3)
-    joint = Joint("contact", law, parameters)
-    excitation = Excitation.of({"press": 60.0}, {1: {"rock": 2.0, "shake": 2.0 / 3}})
-    return HarmonicBalance.of(model, joint, HarmonicBasis((0, 1, 2), 128, joint_transitions(joint)), excitation, 8e3)
-
-
 @pytest.mark.parametrize(
-    ("make", "name", "ends"), [(stop, "unilateral", (0.5, 2.5)), (lifting, "jenkins", (4800.0, 6000.0))]
+    ("make", "name", "ends"), [(stop, "unilateral", (0.5, 2.5)), (pressed_slab, "jenkins", (4800.0, 6000.0))]
 )
 def test_a_law_of_ones_own_gives_the_same_curve_from_both_ends(make, name, ends, tmp_path):
     mine, theirs = make(own_file(tmp_path, name)), make(name)

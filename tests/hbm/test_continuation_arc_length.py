@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 from scipy.optimize import minimize_scalar
 
-from tests.helpers.continuation_models import Duffing, Lifting, rubbing_mass, rubbing_pairs
-from tests.helpers.verification_models import random_structure, slab
+from tests.helpers.continuation_models import Duffing, Lifting, pressed_slab, rubbing_mass, rubbing_pairs
+from tests.helpers.verification_models import random_structure
 from tribodyn.hbm import newton
 from tribodyn.hbm.balance import HarmonicBalance
 from tribodyn.hbm.contact.contact_law import ContactParameters
@@ -21,18 +21,6 @@ from tribodyn.hbm.continuation.methods.arc_length import Options
 from tribodyn.hbm.continuation.parameter import Parameter
 from tribodyn.hbm.excitation import Excitation
 from tribodyn.hbm.harmonics import HarmonicBasis
-
-
-def pressed_slab(
-    harmonics: tuple[int, ...] = (0, 1, 2), rock: float = 2.0, transitions: str = "located"
-) -> HarmonicBalance:
-    """Four pairs that slide, rock and lift: six folds within its first resonance."""
-    model = slab(2, 2, ratio=0.01)
-    parameters = ContactParameters.of(("t1", "t2", "n"), model.interface.stiffness(4e6, 6e6), friction=0.3)
-    excitation = Excitation.of({"press": 60.0}, {1: {"rock": rock, "shake": rock / 3}})
-    return HarmonicBalance.of(
-        model, Joint("contact", "jenkins", parameters), HarmonicBasis(harmonics, 128, transitions), excitation, 8000.0
-    )
 
 
 def test_duffing_has_both_folds_where_its_discriminant_vanishes():

@@ -5,7 +5,8 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from tests.helpers.verification_models import random_structure, slab
+from tests.helpers.three_pairs import FLIPS_AT, three_pairs
+from tests.helpers.verification_models import slab
 from tribodyn.hbm import newton
 from tribodyn.hbm.balance import HarmonicBalance
 from tribodyn.hbm.contact.contact_law import SEPARATES, SLIPS, STICKS, ContactParameters
@@ -103,15 +104,12 @@ def test_four_periodic_motions_at_one_frequency_and_time_integration_finds_each(
 
 @pytest.mark.parametrize("law", ["jenkins", "coulomb_planar"])
 def test_coupled_structure_near_resonance_approaches_time_integration(law):
-    omega = 305.3  # 3 % below the first mode without contact
     errors = []
     for top in (1, 3, 7, 15):
-        model = random_structure(3)
-        parameters = ContactParameters.of(("t1", "t2", "n"), model.interface.stiffness(3e6, 5e6), friction=0.3)
-        excitation = Excitation.of({"static": 30.0}, {1: {"shaker": 60.0}})
-        basis = HarmonicBasis(tuple(range(top + 1)), 1024)
-        balance = HarmonicBalance.of(model, Joint("contact", law, parameters), basis, excitation, omega)
-        solution = newton.solve_from_rest(balance, omega)
+        balance = three_pairs(friction=0.3, static=30.0, shaker=60.0, top=top, law=law).with_samples(
+            1024, located=False
+        )
+        solution = newton.solve_from_rest(balance, FLIPS_AT)
         assert solution.converged
         result = verify(balance, solution.state, Options(steps=2048))
         assert result.outcome == CONVERGED

@@ -41,13 +41,18 @@ def closed_form_force(x: float) -> complex:
     return in_phase + 1j * 4 * MU * NORMAL_FORCE * (x - SLIP) / (np.pi * x * x)
 
 
+def driven(ratio: float, detuning: float = 1.0) -> tuple[float, float, complex]:
+    """Amplitude, so many times that of first slip, frequency over that of resonance, and the force that drives it."""
+    x = ratio * SLIP
+    omega = float(detuning * np.sqrt((STIFFNESS + closed_form_force(x).real) / MASS))
+    damping = 2 * RATIO * np.sqrt(MASS * STIFFNESS)
+    return x, omega, x * (STIFFNESS - MASS * omega**2 + 1j * omega * damping + closed_form_force(x))
+
+
 @pytest.mark.parametrize("ratio", [0.5, 1.01, 1.5, 3.0, 30.0])
 @pytest.mark.parametrize("detuning", [0.7, 1.0, 1.6])
 def test_one_harmonic_of_a_jenkins_element_is_the_closed_form(ratio, detuning):
-    x = ratio * SLIP
-    omega = detuning * np.sqrt((STIFFNESS + closed_form_force(x).real) / MASS)
-    damping = 2 * RATIO * np.sqrt(MASS * STIFFNESS)
-    force = x * (STIFFNESS - MASS * omega**2 + 1j * omega * damping + closed_form_force(x))
+    x, omega, force = driven(ratio, detuning)
     balance = jenkins((0, 1), 8192, force, omega)
     solution = newton.solve_from_rest(balance, omega, NewtonOptions(tolerance=1e-10))
     assert solution.converged
@@ -76,10 +81,7 @@ def test_jenkins_element_approaches_time_integration_with_more_harmonics():
 
 @pytest.mark.parametrize("ratio", [0.5, 1.01, 1.5, 4.0, 30.0])
 def test_law_with_constant_normal_load_is_the_closed_form_to_rounding_where_its_transitions_are_located(ratio):
-    x = ratio * SLIP
-    omega = np.sqrt((STIFFNESS + closed_form_force(x).real) / MASS)
-    damping = 2 * RATIO * np.sqrt(MASS * STIFFNESS)
-    force = x * (STIFFNESS - MASS * omega**2 + 1j * omega * damping + closed_form_force(x))
+    x, omega, force = driven(ratio)
     parameters = ContactParameters.of(("t1",), [[KT]], friction=MU, normal_load=NORMAL_FORCE)
     model = oscillator(MASS, STIFFNESS, RATIO, "t1")
     basis = HarmonicBasis((1,), 3, "located")

@@ -3,7 +3,7 @@
 import numpy as np
 from scipy.optimize import brentq
 
-from tests.helpers.verification_models import oscillator, random_structure
+from tests.helpers.verification_models import oscillator, random_structure, slab
 from tribodyn.hbm.balance import HarmonicBalance
 from tribodyn.hbm.contact.contact_law import ContactParameters
 from tribodyn.hbm.contact.joint import Joint
@@ -104,3 +104,12 @@ def rubbing_pairs(harmonics: tuple[int, ...] = (0, 1), n_samples: int = 64) -> H
     return HarmonicBalance.of(
         random_structure(4, seed=2), Joint("contact", "jenkins", parameters), basis, excitation, 2000.0
     )
+
+
+def pressed_slab(law: str = "jenkins") -> HarmonicBalance:
+    """Four pairs with friction that slide, rock and lift: six folds within the first resonance."""
+    model = slab(2, 2, ratio=0.01)
+    parameters = ContactParameters.of(("t1", "t2", "n"), model.interface.stiffness(4e6, 6e6), friction=0.3)
+    excitation = Excitation.of({"press": 60.0}, {1: {"rock": 2.0, "shake": 2.0 / 3}})
+    basis = HarmonicBasis((0, 1, 2), 128, "located")
+    return HarmonicBalance.of(model, Joint("contact", law, parameters), basis, excitation, 8e3)

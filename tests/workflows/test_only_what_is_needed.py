@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from tests.helpers.matrix_scene import SCENE
+from tests.helpers.matrix_scene import matrix_folder
 from tests.helpers.verification_models import random_structure
 from tribodyn.hbm.balance import HarmonicBalance
 from tribodyn.hbm.contact.contact_law import ContactParameters
@@ -157,10 +157,7 @@ def test_the_command_without_pictures_on_a_mesh_file_loads_no_plots(tmp_path: Pa
 
 def matrix_scene(folder: Path, *overrides: str) -> scene_file.SceneFile:
     """The scene of matrices, with a file of them beside it."""
-    system = random_structure(2, n_extra=12).system
-    np.savez(folder / "part.npz", M=system.mass, K=system.stiffness, C=system.damping)
-    (folder / "own.toml").write_text(SCENE)
-    return scene_file.read(str(folder / "own.toml"), ("wear=", "response.points=4", *overrides))
+    return scene_file.read(str(matrix_folder(folder) / "own.toml"), ("wear=", "response.points=4", *overrides))
 
 
 def test_the_static_part_is_there_where_a_static_load_is_and_nowhere_else(tmp_path: Path) -> None:

@@ -89,17 +89,8 @@ def test_rough_faces_soften_and_damp_along_the_backbone(faces):
 def test_the_command_gives_rows_by_modal_amplitude(capsys: pytest.CaptureFixture[str], tmp_path: Path, monkeypatch):
     model = built("plain")
     monkeypatch.setattr(modelling, "build", lambda file, *_: model)
-    words = [
-        "curve",
-        "backbone",
-        "brb_flat",
-        "--points",
-        "4",
-        "--out",
-        str(tmp_path),
-        "--json",
-    ]  # beside what is published
-    record = printed_record(words, capsys)
+    words = ["--points", "4", "--out", str(tmp_path), "--json"]
+    record = printed_record(["curve", "backbone", "brb_flat", *words], capsys)  # beside what is published
     rows = record["rows"]
     assert record["published"]["source"] == "Porter and Brake 2023"
     first, last = record["published"]["rows"][0], record["published"]["rows"][-1]
