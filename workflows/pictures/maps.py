@@ -5,14 +5,11 @@ from typing import Any
 
 import numpy as np
 
-from tribodyn.hbm.balance import HarmonicBalance
-from tribodyn.hbm.continuation.nonlinear_modes import Backbone
 from tribodyn.hbm.harmonics import HarmonicBasis
 from tribodyn.refusal import Refusal
 from tribodyn.workflows.pictures.figures import (
     area_energy_unit,
     length_unit,
-    named,
     pressure_unit,
     scale_bar,
     status_legend,
@@ -23,11 +20,8 @@ from tribodyn.workflows.pictures.theme import LAYOUT, MOTION_MAP, PRESSURE_MAP, 
 from tribodyn.workflows.result.contact_states import shown_cycles, shown_states, state_of
 from tribodyn.workflows.result.result import Patch, Result
 
-Row = tuple[str, Sequence[tuple[str, np.ndarray]]]
+Row = tuple[str, list[tuple[str, np.ndarray]]]
 """A row of maps: colour map, and for each column the label of its scale and the values (n_pair,)."""
-
-Motion = tuple[np.ndarray, np.ndarray, np.ndarray]
-"""Largest slide [m], largest gap [m], friction work per cycle and area [J/m2], (n_pair,) each."""
 
 
 def patch_maps(result: Result, rows: Sequence[int] | np.ndarray | None = None) -> Figure:
@@ -86,41 +80,21 @@ def motion_maps(result: Result, rows: Sequence[int] | np.ndarray | None = None) 
     n = len(wear.cycles)
     rows = np.unique([0, (n - 1) // 2, n - 1]) if rows is None else rows
     basis = HarmonicBasis(result.harmonics, LAYOUT.samples)
-    columns = []
+    fields: list[Row] = [(colors, []) for colors in (MOTION_MAP, PRESSURE_MAP, WEAR_MAP)]
     for row in rows:
         x = wear.displacement[row].reshape(len(patch.area), -1, basis.n_coeff)
         slide, gap = slide_and_gap(patch.components, x, basis, patch.gap + wear.depth[row])
-        columns.append((slide, gap, wear.energy[row] / patch.area))
+        for (_, line), name, values, unit_of in zip(
+            fields,
+            ("largest slide along the face", "largest gap", "friction work"),
+            (slide, gap, wear.energy[row] / patch.area),
+            (length_unit, length_unit, area_energy_unit),
+            strict=True,
+        ):
+            unit, factor = unit_of(float(np.abs(values).max()))
+            line.append((f"{name} / {unit}", factor * values))
     labels = [state_of(result, int(row)).label for row in rows]
-    return _motion(patch, columns, labels, titled(result, "contact over wear"))
-
-
-def backbone_maps(balance: HarmonicBalance, mode: Backbone, scene: str = "", columns: int = 4) -> "Figure | None":
-    """The same at some converged points of a backbone, evenly spaced in the logarithm of the amplitude.
-
-    Returns None where the contact is no face or has no friction; scene : its name, for the title"""
-    i = balance.model.interface
-    good = np.flatnonzero(mode.converged)
-    if not len(i.faces) or not {"t1", "t2"} & set(i.components) or not len(good):
-        return None
-    none, nowhere = np.zeros(i.n_pair), np.full(i.n_pair, -1)
-    patch = Patch(i.components, nowhere, i.points, i.frames, i.area, i.gap, i.faces, none)
-    level = np.log(mode.amplitude[good])
-    targets = np.linspace(level.min(), level.max(), columns)
-    chosen = list(dict.fromkeys(int(good[np.abs(level - value).argmin()]) for value in targets))
-    unit, factor = length_unit(float(mode.amplitude[chosen].max()))
-    titles = [f"{factor * mode.amplitude[at]:.3g} {unit}, {mode.frequency[at]:.4g} Hz" for at in chosen]
-    motion = [backbone_motion(balance, mode, at) for at in chosen]
-    return _motion(patch, motion, titles, named(scene, "contact along the backbone"))
-
-
-def backbone_motion(balance: HarmonicBalance, mode: Backbone, at: int) -> Motion:
-    """What the pairs do at a point of the backbone; a gap is negative where the faces stay in touch."""
-    contact = balance.contact
-    x = balance.shaped(mode.contact[at])
-    state = balance.evaluate(float(mode.omega[at]), x, jacobian=False)
-    slide, gap = slide_and_gap(balance.model.interface.components, x, balance.basis, contact.gap)
-    return slide, gap, balance.energy(state) / balance.model.interface.area
+    return _drawn(patch, fields, labels, titled(result, "contact over wear"))[0]
 
 
 def slide_and_gap(
@@ -158,20 +132,6 @@ def draw_status(axes: Any, patch: Patch, status: np.ndarray) -> None:
     axes.add_collection(PolyCollection(list(corners), facecolors=colors, edgecolors=colors, linewidths=0.6))
     axes.autoscale_view()
     axes.set_aspect("equal")
-
-
-def _motion(patch: Patch, columns: Sequence[Motion], titles: Sequence[str], title: str) -> Figure:
-    """Slide, gap and friction work of some states side by side, each in the unit that suits it."""
-    kinds = (
-        ("largest slide along the face", MOTION_MAP, length_unit),
-        ("largest gap", PRESSURE_MAP, length_unit),
-        ("friction work", WEAR_MAP, area_energy_unit),
-    )
-    rows: list[Row] = []
-    for line, (name, colors, unit_of) in enumerate(kinds):
-        scaled = [(*unit_of(float(np.abs(values[line]).max())), values[line]) for values in columns]
-        rows.append((colors, [(f"{name} / {unit}", factor * values) for unit, factor, values in scaled]))
-    return _drawn(patch, rows, titles, title)[0]
 
 
 def _drawn(patch: Patch, rows: Sequence[Row], titles: Sequence[str], title: str) -> tuple[Figure, np.ndarray]:

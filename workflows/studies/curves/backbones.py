@@ -16,7 +16,6 @@ from tribodyn.hbm.continuation.nonlinear_modes import Backbone, BackboneOptions
 from tribodyn.hbm.threads import limited
 from tribodyn.refusal import Refusal, SolveFailed
 from tribodyn.workflows.pictures.figures import axes_of, length_unit, named
-from tribodyn.workflows.pictures.maps import backbone_maps
 from tribodyn.workflows.pictures.matplotlib_names import Figure
 from tribodyn.workflows.pictures.theme import BLUE, GREY, ORANGE
 from tribodyn.workflows.result.number_format import named_lines
@@ -64,10 +63,9 @@ class AmplitudeRange:
 class SceneBackbone(StudyResult):
     """The backbone of a scene.
 
-    balance : of the scene; mode : its points; published : of the same mode by others, None for none"""
+    mode : its points; published : of the same mode by others, None for none"""
 
     name: str
-    balance: HarmonicBalance
     mode: Backbone
     published: PublishedBackbone | None = None
 
@@ -121,13 +119,8 @@ class SceneBackbone(StudyResult):
             )
 
     def write(self, folder: Path) -> list[Path]:
-        """Write backbone.csv, backbone.png and, where faces rub, backbone_maps.png."""
-
-        def pictures() -> dict[str, Figure]:
-            maps = backbone_maps(self.balance, self.mode, self.name)
-            return {"backbone": self.plot(), **({} if maps is None else {"backbone_maps": maps})}
-
-        return write_files(folder, {"backbone": self.columns}, pictures)
+        """Write backbone.csv and backbone.png."""
+        return write_files(folder, {"backbone": self.columns}, lambda: {"backbone": self.plot()})
 
     def plot(self) -> Figure:
         """Frequency and damping ratio against amplitude, what is published beside them."""
@@ -181,7 +174,7 @@ def backbone(
         nonlinear_mode = follow_mode(file, balance, range_, report)
     if not nonlinear_mode.converged.any():
         raise SolveFailed(f"the backbone {nonlinear_mode.end}")
-    return SceneBackbone(file.name, balance, nonlinear_mode, published)
+    return SceneBackbone(file.name, nonlinear_mode, published)
 
 
 def follow_mode(
