@@ -3,11 +3,12 @@
 A plain structure is the wave of index 0 at engine order 0; for a wheel see `wave_exponents`."""
 
 from collections.abc import Callable
+from contextlib import suppress
 from typing import Any
 
 import numpy as np
 import scipy.linalg as sla
-from scipy.sparse.linalg import LinearOperator, eigs
+from scipy.sparse.linalg import ArpackNoConvergence, LinearOperator, eigs
 
 # over omega: real parts up to it count as zero, for the solution is no better than that; how exactly they are known
 GROWS, ACCURACY = 1e-6, 1e-3
@@ -69,10 +70,11 @@ def _nearest(now: complex, *problem: Any) -> complex:
 
     values = np.empty(0)
     if n > 10:
-        inverse_values, vectors = eigs(
-            LinearOperator((2 * n, 2 * n), inverse, dtype=complex), 4, v0=np.ones(2 * n), tol=1e-11
-        )
-        values, _ = _central(numbers, shift + 1 / inverse_values, vectors)
+        with suppress(ArpackNoConvergence):  # then all are computed
+            inverse_values, vectors = eigs(
+                LinearOperator((2 * n, 2 * n), inverse, dtype=complex), 4, v0=np.ones(2 * n), tol=1e-11
+            )
+            values, _ = _central(numbers, shift + 1 / inverse_values, vectors)
     if len(values) == 0:
         values, _ = index_exponents(*problem)
     return complex(values[np.argmin(np.abs(values - now))])

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from scipy.sparse.linalg import ArpackNoConvergence
 
 from tests.helpers.reduced import HarmonicModel
 from tests.helpers.stability_in_time import multipliers, stability_in_time
@@ -17,7 +18,7 @@ from tribodyn.hbm.continuation.methods import arc_length, natural
 from tribodyn.hbm.excitation import Excitation
 from tribodyn.hbm.harmonics import HarmonicBasis
 from tribodyn.hbm.outcome import CONVERGED
-from tribodyn.hbm.stability import exponents, floquet
+from tribodyn.hbm.stability import exponents, floquet, hill_problem
 from tribodyn.hbm.stability.branch_stability import stability_along
 from tribodyn.hbm.stability.exponents import Stability, stability
 from tribodyn.hbm.stability.floquet import monodromy
@@ -106,6 +107,22 @@ def lifting_mass() -> HarmonicBalance:
     return HarmonicBalance.of(
         oscillator(1.0, 1e4, 0.01, "n"), Joint("contact", "unilateral", parameters), basis, excitation, 300.0
     )
+
+
+def test_exponents_whose_iteration_does_not_converge_are_computed_with_all_others(monkeypatch):
+    """Arnoldi's iteration gave up on a beam of set-valued contact and ended the run in a traceback."""
+    balance = three_pairs(friction=0.2, static=30.0, shaker=30.0, top=5)
+    state = newton.solve_from_rest(balance, FLIPS_AT).state
+    calls = []
+
+    def unconverged(*_, **__):
+        calls.append(1)
+        raise ArpackNoConvergence("no convergence", np.empty(0), np.empty((0, 0)))
+
+    iterated = stability(balance, state).exponents
+    monkeypatch.setattr(hill_problem, "eigs", unconverged)
+    np.testing.assert_allclose(stability(balance, state).exponents, iterated, rtol=1e-6, atol=1e-6 * state.omega)
+    assert calls
 
 
 def test_folds_of_a_lifting_mass_are_marked_where_the_branch_turns():
