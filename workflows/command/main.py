@@ -28,11 +28,11 @@ READER_LEFT = 128 + 13  # as a shell counts the end by SIGPIPE, which Windows ha
 WORDS = {  # word -> where it is, its help on the page of all of them, an example
     "cases": ("cases_word:cases", "List the scenes that come with the program.",
         "cases"),
-    "new": ("file_words:new", "Begin a scene from a mesh, a deck or a CAD file.",
+    "new": ("study_words:new", "Begin a scene from a mesh, a deck or a CAD file.",
         "new part.step --out begun"),
     "run": ("scene_words:run", "Run a scene and leave its result and pictures in a folder.",
         "run beam --set contact.friction=0.3 --out results/low"),
-    "inspect": ("file_words:inspect", "Show what a mesh, a deck, a CAD file or a scene holds.",
+    "inspect": ("study_words:inspect", "Show what a mesh, a deck, a CAD file or a scene holds.",
         "inspect part.step --unit mm"),
     "plan": ("scene_words:plan", "Show what a scene will model, and what it will cost, before running it.",
         "plan beam"),
@@ -40,15 +40,15 @@ WORDS = {  # word -> where it is, its help on the page of all of them, an exampl
         "show results/beam --verbose"),
     "draw": ("scene_words:draw", "Draw pictures or films of a result.",
         "draw results/beam --film cycle"),
-    "verify": ("verify_word:verify", "Check a result against direct time integration.",
+    "verify": ("study_words:verify", "Check a result against direct time integration.",
         "verify results/beam"),
     "report": ("scene_words:report", "Write one HTML file that shows results.",
         "report results/beam results/low --out report.html"),
     "export": ("scene_words:export", "Write a result in the formats of other programs.",
         "export results/beam --to csv"),
-    "curve": ("curve_words:app", "Follow curves: backbone, ring-down."),
-    "wheel": ("wheel_words:app", "Wheels: modes, flutter, mistuned blades and patterns of them."),
-    "study": ("study_words:app", "Studies: grid, lives, optimise, identify, converge and more."),
+    "curve": ("study_words:curve", "Follow curves: backbone, ring-down."),
+    "wheel": ("study_words:wheel", "Wheels: modes, flutter, mistuned blades and patterns of them."),
+    "study": ("study_words:study", "Studies: grid, lives, optimise, identify, converge and more."),
 }  # fmt: skip
 
 app = cyclopts.App(
