@@ -221,7 +221,7 @@ def commands(program: App) -> str:
     """A section for each command, from the help that the command itself prints."""
     lines: list[str] = []
     for name, command in _words(program, ""):
-        lines += [f"## `tribodyn {name}`", "", _paragraph(command.help.split("Parameters\n")[0]), ""]
+        lines += [f"## `tribodyn {name}`", "", _paragraph(command.help.split("Parameters:\n")[0]), ""]
         arguments = command.assemble_argument_collection(parse_docstring=True)
         rows = []
         for argument in arguments:

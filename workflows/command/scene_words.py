@@ -42,26 +42,17 @@ def run(
 
     A scene may name Python files beside it: running somebody's scene runs his code.
 
-    Parameters
-    ----------
-    scene
-        Name of a scene (see `tribodyn cases`) or a .toml file.
-    accuracy
-        Relative error wanted, such as "1 %", or of what is named, "1 % of energy": the scene is run with finer and
-        finer settings until the errors of its verdict are below that; exit code 3 where they do not get there. Without
-        depth or life in it nothing is worn.
-    out
-        Folder of the result; results/NAME by default.
-    resume
-        Resume an unfinished result in the folder.
-    pictures
-        Draw curves, maps and renders when done.
-    quiet
-        Print nothing but what goes wrong.
-    verbose
-        Print sizes, the seconds of each stage, every number and every file too.
-    log
-        File to which every line of progress is added, with its time."""
+    Parameters:
+        scene: Name of a scene (see `tribodyn cases`) or a .toml file.
+        accuracy: Relative error wanted, such as "1 %", or of what is named, "1 % of energy": the scene is run with
+            finer and finer settings until the errors of its verdict are below that; exit code 3 where they do not get
+            there. Without depth or life in it nothing is worn.
+        out: Folder of the result; results/NAME by default.
+        resume: Resume an unfinished result in the folder.
+        pictures: Draw curves, maps and renders when done.
+        quiet: Print nothing but what goes wrong.
+        verbose: Print sizes, the seconds of each stage, every number and every file too.
+        log: File to which every line of progress is added, with its time."""
     make_room(out)
     progress = console_progress(quiet, log, verbose)
     file = scene_file.read(scene, overrides)
@@ -99,14 +90,10 @@ def _stop_message(path: Path, scene: str, overrides: Sequence[str]) -> str:
 def plan(scene: str, *, overrides: Overrides = (), picture: Path | None = None, allow_scripts: Flag = False) -> None:
     """Show what a scene will model, and what it will cost, before running it.
 
-    Parameters
-    ----------
-    scene
-        Name of a scene (see `tribodyn cases`) or a .toml file.
-    picture
-        A .png file to draw the scene in: bodies, contacts in colour, what is held, loads as arrows.
-    allow_scripts
-        Run a Python file or a drawing (.geo) that makes the part."""
+    Parameters:
+        scene: Name of a scene (see `tribodyn cases`) or a .toml file.
+        picture: A .png file to draw the scene in: bodies, contacts in colour, what is held, loads as arrows.
+        allow_scripts: Run a Python file or a drawing (.geo) that makes the part."""
     make_room(picture, (".png",))
     planned = front_door.plan(scene, overrides, allow_scripts=allow_scripts)
     print(*map(printable, named_lines(planned.lines())), sep="\n")
@@ -122,14 +109,10 @@ def _print(result: Result, verbose: bool) -> None:
 def show(result: Path, *, verbose: Verbose = False, as_json: Json = False) -> None:
     """Show what a result holds: its model, response, wear and errors, and what is to be doubted.
 
-    Parameters
-    ----------
-    result
-        Folder or file of a result.
-    verbose
-        Every number, and what each refinement changed.
-    as_json
-        Print JSON for machines."""
+    Parameters:
+        result: Folder or file of a result.
+        verbose: Every number, and what each refinement changed.
+        as_json: Print JSON for machines."""
     loaded = store.load(result)
     if as_json:
         print(json.dumps(loaded.summary(), indent=2))
@@ -149,24 +132,16 @@ def draw(
 ) -> None:
     """Draw the pictures of a result again, or films of it.
 
-    Parameters
-    ----------
-    result
-        Folder or file of a result.
-    film
-        A film instead of pictures: of the contact over wear, or of the part and the status of its pairs over one cycle;
-        can be both.
-    formats
-        Of pictures png (default), pdf or svg, of films mp4 (default) or gif; can be repeated.
-    dpi
-        Dots per inch: of a picture 200, of a film of 12.8 by 7.2 inches 100 by default.
-    row
-        Wear row, or point of a response that does not wear, whose cycle is filmed; by default that whose contact works
-        most.
-    images
-        Images of a film, at the most.
-    out
-        Folder of pictures and films; pictures/ beside the result by default."""
+    Parameters:
+        result: Folder or file of a result.
+        film: A film instead of pictures: of the contact over wear, or of the part and the status of its pairs over one
+            cycle; can be both.
+        formats: Of pictures png (default), pdf or svg, of films mp4 (default) or gif; can be repeated.
+        dpi: Dots per inch: of a picture 200, of a film of 12.8 by 7.2 inches 100 by default.
+        row: Wear row, or point of a response that does not wear, whose cycle is filmed; by default that whose contact
+            works most.
+        images: Images of a film, at the most.
+        out: Folder of pictures and films; pictures/ beside the result by default."""
     make_room(out)
     if dpi is not None and not 20 <= dpi <= 2400:
         raise Refusal(f"--dpi {dpi}: give 20 to 2400 dots per inch")
@@ -200,12 +175,9 @@ def _draw(
 def report(*result: Path, out: Path | None = None) -> None:
     """Write one HTML file that shows results and opens anywhere, without a network.
 
-    Parameters
-    ----------
-    result
-        Folders or files of results; several are shown side by side, with differences from the first.
-    out
-        The .html file; report.html beside the first result by default."""
+    Parameters:
+        result: Folders or files of results; several are shown side by side, with differences from the first.
+        out: The .html file; report.html beside the first result by default."""
     if not result:
         raise Refusal("report: give the folder or file of a result")
     make_room(out, (".html",))
@@ -217,19 +189,14 @@ def export(
 ) -> None:
     """Write a result in the formats of other programs.
 
-    Parameters
-    ----------
-    result
-        Folder or file of a result.
-    to
-        Formats, one or several: vtk (series for ParaView), csv, mat, uff (tables and curves), mesh (worn part
-        with its fields), npz, matlab (reduced matrices).
-    out
-        Folder, in which each format gets a folder of its own; export/ beside the result by default.
-    mesh_ending
-        Format of the mesh by its ending, such as .vtu, .exo, .msh or .bdf.
-    allow_scripts
-        Run Python files and drawings (.geo) that the scene of the result names, to make its matrices again."""
+    Parameters:
+        result: Folder or file of a result.
+        to: Formats, one or several: vtk (series for ParaView), csv, mat, uff (tables and curves), mesh (worn part with
+            its fields), npz, matlab (reduced matrices).
+        out: Folder, in which each format gets a folder of its own; export/ beside the result by default.
+        mesh_ending: Format of the mesh by its ending, such as .vtu, .exo, .msh or .bdf.
+        allow_scripts: Run Python files and drawings (.geo) that the scene of the result names, to make its matrices
+            again."""
     make_room(out)
     folder = out or store.result_file(result).parent / "export"
     for written in front_door.export(result, to, folder, mesh_ending, allow_scripts=allow_scripts):
