@@ -70,7 +70,7 @@ def identify(
     second : in the coordinates of the first, already mirrored; both are centred and the smaller extent counts
     cutoff : wavelength [m] above which waves are no roughness and taken off; only the mean plane by default
     shortest : wavelength [m] below which waves are noise of the instrument and taken off (S-filter of ISO 25178-2)
-    Raises  Refusal: what surface.prepare refuses, heights that come in steps, too few summits"""
+    Raises  Refusal: what map_repair.repair refuses, heights that come in steps, too few summits"""
     faces: list[HeightMap] = []
     repairs: list[str] = []
     for face in (first, second):

@@ -1,7 +1,7 @@
 """Check and repair measured height maps, and split them into waviness and roughness.
 
-`prepare` runs the steps in order: refuse what cannot be a machined face, take spikes out, close holes, level, filter.
-Each step that changes measured points reports it in a sentence."""
+`repair` runs the steps in order: refuse what cannot be a machined face, take spikes out, close holes, level; `split`
+filters. Each step that changes measured points reports it in a sentence."""
 
 from dataclasses import dataclass, replace
 
@@ -45,30 +45,11 @@ class MapLimits:
 LIMITS = MapLimits()
 
 
-@dataclass(frozen=True)
-class PreparedMap:
-    """A height map ready for contact.
+def repair(surface: HeightMap, expected_size: tuple[float, float] | None = None) -> tuple[HeightMap, tuple[str, ...]]:
+    """The map without spikes and holes, levelled, and a sentence for each thing that was changed.
 
-    waviness, roughness : levelled parts; their sum is the levelled surface
-    repairs : one sentence for each thing that was changed"""
-
-    waviness: HeightMap
-    roughness: HeightMap
-    repairs: tuple[str, ...]
-
-
-def prepare(surface: HeightMap, cutoff: float, expected_size: tuple[float, float] | None = None) -> PreparedMap:
-    """Check, mend, level and split a measured surface.
-
-    cutoff : wavelength that parts waviness from roughness [m]
     expected_size : sides of the face it should cover [m]
     Raises  Refusal: what the steps refuse"""
-    levelled, repairs = repair(surface, expected_size)
-    return PreparedMap(*split(levelled, cutoff), repairs)
-
-
-def repair(surface: HeightMap, expected_size: tuple[float, float] | None = None) -> tuple[HeightMap, tuple[str, ...]]:
-    """The map without spikes and holes, levelled, and the list of changes; arguments and errors as of `prepare`."""
     check(surface, expected_size)
     without_spikes, spikes = remove_outliers(surface)
     filled, holes = fill_holes(without_spikes)

@@ -10,7 +10,7 @@ import pytest
 
 from tribodyn.geometry.height_map import HeightMap, centred, facing_gap, level, mirrored, onto_nodes, synthetic_pair
 from tribodyn.geometry.height_map_files import read
-from tribodyn.geometry.map_repair import check, fill_holes, prepare, remove_outliers, split
+from tribodyn.geometry.map_repair import check, fill_holes, remove_outliers, repair, split
 
 MICRO = 1e-6
 
@@ -241,12 +241,13 @@ def test_synthetic_pair_touches_at_its_two_ridges():
     repeated, _ = synthetic_pair(7)
     np.testing.assert_array_equal(first.z, repeated.z)
     assert not np.array_equal(first.z, synthetic_pair(8)[0].z)
-    waves = [prepare(face, 0.8e-3, expected_size=(2e-3, 5e-3)) for face in (first, second)]
-    assert all(wave.repairs == () for wave in waves)
-    gap = facing_gap(*(onto_nodes(wave.waviness, rig_nodes()) for wave in waves)).reshape(5, 11)
+    levelled, repairs = zip(*(repair(face, expected_size=(2e-3, 5e-3)) for face in (first, second)), strict=True)
+    assert repairs == ((), ())
+    waves = [split(face, 0.8e-3) for face in levelled]
+    gap = facing_gap(*(onto_nodes(waviness, rig_nodes()) for waviness, _ in waves)).reshape(5, 11)
     assert gap[[0, -1]].mean() < 1.5e-6 < 4e-6 < gap[2].mean()
     assert gap.argmin() // 11 in (0, 4)
-    assert waves[0].roughness.z.std() == pytest.approx(1e-6, rel=0.1)
+    assert waves[0][1].z.std() == pytest.approx(1e-6, rel=0.1)
 
 
 def test_damaged_measurement_comes_out_like_the_sound_one():
@@ -256,11 +257,11 @@ def test_damaged_measurement_comes_out_like_the_sound_one():
     damaged[60:72, 300:330] = np.nan
     damaged[120, 40] = 1e-3
     tilted = damaged + 2e-2 * sound.x[:, None]
-    mended = prepare(replace(sound, z=tilted), 0.8e-3)
-    assert len(mended.repairs) == 2
-    expected = prepare(sound, 0.8e-3).waviness
-    assert abs(mended.waviness.z - expected.z).max() < 0.4e-6
-    assert abs(onto_nodes(mended.waviness, rig_nodes()) - onto_nodes(expected, rig_nodes())).max() < 0.15e-6
+    mended, repairs = repair(replace(sound, z=tilted))
+    assert len(repairs) == 2
+    waviness, expected = split(mended, 0.8e-3)[0], split(repair(sound)[0], 0.8e-3)[0]
+    assert abs(waviness.z - expected.z).max() < 0.4e-6
+    assert abs(onto_nodes(waviness, rig_nodes()) - onto_nodes(expected, rig_nodes())).max() < 0.15e-6
 
 
 # ---- garbage ----

@@ -5,7 +5,7 @@ import scipy
 
 from tribodyn.fem.interface import COMPONENTS, ContactInterface
 from tribodyn.geometry.height_map import centred, facing_gap, onto_nodes
-from tribodyn.geometry.map_repair import prepare
+from tribodyn.geometry.map_repair import repair, split
 from tribodyn.refusal import Refusal
 from tribodyn.workflows.run import model_cache
 from tribodyn.workflows.scene.contact_numbers import faces
@@ -34,9 +34,9 @@ def surface_gap(file: SceneFile, interface: ContactInterface) -> tuple[np.ndarra
         repairs: list[str] = []
         heights = np.zeros((2, len(nodes)))
         for i, face in enumerate(faces(surfaces, file.folder)):
-            prepared = prepare(face, surfaces.cutoff, (float(size[0]), float(size[1])))
-            heights[i] = onto_nodes(centred(prepared.waviness), nodes)
-            repairs += prepared.repairs
+            levelled, changed = repair(face, (float(size[0]), float(size[1])))
+            heights[i] = onto_nodes(centred(split(levelled, surfaces.cutoff)[0]), nodes)
+            repairs += changed
         return heights, tuple(repairs)
 
     heights, repairs = model_cache.cached_heights(file, nodes, prepared_heights)
