@@ -33,7 +33,8 @@ def main(folder: Path) -> None:
     trouble = factor.getMumpsInfog(1)
     version = ".".join(str(number) for number in petsc.Sys.getVersion())
     _tell(rank, f"trouble {trouble}" if trouble < 0 else f"ready {processes} {version}")
-    while (count := comm.bcast(_next_count() if rank == 0 else None)) and trouble >= 0:
+    # a line is a number of right-hand sides; none is left where the input ends
+    while (count := comm.bcast(int(sys.stdin.readline() or 0) if rank == 0 else None)) and trouble >= 0:
         rhs = np.memmap(folder / "rhs", np.float64, "r", shape=(n, count), order="F")
         solution = np.memmap(folder / "found", np.float64, "r+", shape=(n, count), order="F")
         shape, part = ((n_local, n), (None, count)), np.array(rhs[start:stop], order="F")
@@ -62,12 +63,6 @@ def _petsc() -> tuple[Any, Any]:
     from petsc4py import PETSc
 
     return PETSc, MPI.COMM_WORLD
-
-
-def _next_count() -> int:
-    """How many right-hand sides the next line asks for; 0 where there is no more."""
-    line = sys.stdin.readline().split()
-    return int(line[0]) if line else 0
 
 
 def _tell(rank: int, text: str) -> None:

@@ -36,15 +36,10 @@ def usable(count: int) -> int:
 @contextmanager
 def limited(count: int) -> Iterator[None]:
     """So many threads within the context, but not more than `usable`; BLAS has one of them in what is `single`."""
-    with _blas_threads(usable(count)):
-        yield
-
-
-@contextmanager
-def _blas_threads(count: int) -> Iterator[None]:
-    before = _blas.set(count)
+    limit = usable(count)
+    before = _blas.set(limit)
     try:
-        with _controller().limit(limits=count):
+        with _controller().limit(limits=limit):
             yield
     finally:
         _blas.reset(before)
@@ -57,7 +52,7 @@ def single(function: Callable[P, R]) -> Callable[P, R]:
     def wrapped(*args: P.args, **kwargs: P.kwargs) -> R:
         if _blas.get() == 1:
             return function(*args, **kwargs)
-        with _blas_threads(1):
+        with limited(1):
             return function(*args, **kwargs)
 
     return wrapped

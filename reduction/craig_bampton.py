@@ -64,7 +64,8 @@ def craig_bampton(
     stiffness = np.diag(np.concatenate([np.zeros(n_m), squares]))
     K_sm, K_ms, K_mm = csc_matrix(K[s][:, m]), K[m][:, s], K[m][:, m]
     for block in _blocks(n_m):
-        psi = constraint_modes(factor, K_sm[:, block])
+        with threadpool_limits(1):
+            psi = -factor.solve(K_sm[:, block].toarray())
         basis[s, block] = psi
         stiffness[:n_m, block] = K_mm[:, block] + K_ms @ psi  # A.7
     stiffness = _symmetric(stiffness)
@@ -98,12 +99,6 @@ def master_dofs(
     touched = [np.flatnonzero(v) for v in (*system.loads.values(), *system.outputs.values())]
     points = [dofs for dofs in touched if len(dofs) <= LIMITS.point_load]
     return np.concatenate([csc_matrix(interface.B).nonzero()[1], np.asarray(extra, dtype=int).ravel(), *points])
-
-
-def constraint_modes(factor: Factor, K_sm: csc_matrix) -> np.ndarray:
-    """Static shapes Psi = -K_ss^-1 K_sm (n_slave, n_master) of unit displacements of some masters."""
-    with threadpool_limits(1):
-        return -factor.solve(K_sm.toarray())
 
 
 def fixed_interface_modes(

@@ -2,6 +2,7 @@
 
 import contextlib
 import io
+import re
 import zipfile
 import zlib
 from collections.abc import Iterator
@@ -35,7 +36,10 @@ def variables(path: Path) -> list[str]:
             if h5py.is_hdf5(path):
                 with opened_hdf5(path) as archive:
                     return sorted(name for name in archive if not name.startswith("#"))
-            return sorted(name for name, _, _ in _whosmat(path))
+            try:
+                return sorted(name for name, _, _ in scipy.io.whosmat(path))
+            except (ValueError, TypeError, OSError):
+                raise Refusal(f"{path.name} is not a MATLAB file: write it with save") from None
         if path.suffix.lower() == ".op4":
             return list(nastran_matrix.read_op4(path))
         if nastran_matrix.holds_dmig(path):
@@ -108,13 +112,6 @@ def _opened_npz(path: Path) -> Any:
     return np.load(path)
 
 
-def _whosmat(path: Path) -> Any:
-    try:
-        return scipy.io.whosmat(path)
-    except (ValueError, TypeError, OSError):
-        raise Refusal(f"{path.name} is not a MATLAB file: write it with save") from None
-
-
 def _from_mat(path: Path, variable: str) -> Any:
     if not h5py.is_hdf5(path):
         return scipy.io.loadmat(path, variable_names=[variable])[variable]
@@ -153,7 +150,8 @@ def _from_matrix_market(path: Path) -> Any:
         n_row, _, entries, kind, field, symmetry = scipy.io.mminfo(io.BytesIO(content))
         if field not in ("real", "double", "integer", "unsigned-integer") or symmetry == "hermitian":
             raise Refusal(f"{path.name} holds a {field} {symmetry} matrix: real numbers are needed")
-        body = _after_sizes(content)
+        # what follows the line with the sizes, the first that is neither empty nor a comment
+        body = re.sub(rb"(?:[^\S\n]*(?:%.*)?\n)*.*\n?", b"", content, count=1)
         if kind == "array" and symmetry != "general":
             entries = n_row * (n_row + (1 if symmetry == "symmetric" else -1)) // 2
         if body.translate(None, NUMBERS):
@@ -165,18 +163,6 @@ def _from_matrix_market(path: Path) -> Any:
         if str(problem).startswith(path.name):
             raise
         raise Refusal(f"{path.name} is a broken Matrix Market file: {' '.join(str(problem).split())}") from None
-
-
-def _after_sizes(text: bytes) -> bytes:
-    """What follows the line with the sizes, the first that is neither empty nor a comment."""
-    start = 0
-    while start < len(text):
-        stop = text.find(b"\n", start) + 1 or len(text)
-        line = text[start:stop].strip()
-        start = stop
-        if line and not line.startswith(b"%"):
-            break
-    return text[start:]
 
 
 def _require(path: Path) -> None:

@@ -8,7 +8,7 @@ Source  the relative displacement of a shroud in Tamatam 2021, section 3.2.2, fo
 from dataclasses import replace
 
 import numpy as np
-from scipy.sparse import csr_matrix, eye_array, kron
+from scipy.sparse import bsr_array, csr_matrix, eye_array, kron
 
 from tribodyn.fem.interface import COMPONENTS, ContactInterface
 from tribodyn.fem.system import SecondOrderSystem
@@ -48,19 +48,10 @@ def body_1_dofs(interface: ContactInterface) -> np.ndarray:
     if interface.components != COMPONENTS:
         raise Refusal(f"relative coordinates need contact components t1, t2, n, not {list(interface.components)}")
     interface = interface.nodes or interface
-    n_pair = interface.n_pair
-    B = csr_matrix(interface.B)
-    dofs = np.empty((n_pair, 3), dtype=int)
-    for axis in range(3):
-        weights = csr_matrix(
-            (interface.frames[:, :, axis].ravel(), (np.repeat(np.arange(n_pair), 3), np.arange(3 * n_pair))),
-            shape=(n_pair, 3 * n_pair),
-        )
-        image = csr_matrix(weights @ B)  # x turned from its frame back to the axis
-        for pair in range(n_pair):
-            row = slice(image.indptr[pair], image.indptr[pair + 1])
-            unit = image.indices[row][image.data[row] > 1 - 1e-9]
-            if len(unit) != 1:
-                raise Refusal("relative coordinates need body-1 nodes that are free in x, y and z")
-            dofs[pair, axis] = unit[0]
-    return dofs
+    pairs, rows = np.arange(interface.n_pair + 1), np.arange(3 * interface.n_pair)
+    back = bsr_array((interface.frames.transpose(0, 2, 1), pairs[:-1], pairs), shape=(len(rows), len(rows)))
+    turned = csr_matrix(back @ csr_matrix(interface.B))  # x, from the frame of each pair back to the axes
+    is_unit = turned.data > 1 - 1e-9
+    if not np.array_equal(np.repeat(rows, np.diff(turned.indptr))[is_unit], rows):
+        raise Refusal("relative coordinates need body-1 nodes that are free in x, y and z")
+    return turned.indices[is_unit].astype(int).reshape(-1, 3)

@@ -175,7 +175,8 @@ def solve_along_friction(balance: HarmonicBalance, omega: float, options: Newton
         nonlocal solution, x, spent, products
         if spent >= SLIDING_STEPS:
             return False
-        solution = newton.solve(_with_friction(balance, level), omega, x, options)
+        rough = balance.with_contact(balance.contact.with_friction_scaled(10.0**level))
+        solution = newton.solve(rough, omega, x, options)
         spent, products = spent + solution.steps, products + solution.products
         x = solution.state.x if solution.converged else x
         return solution.converged
@@ -184,10 +185,3 @@ def solve_along_friction(balance: HarmonicBalance, omega: float, options: Newton
     if first is None or lead(first, 0.0, rougher) > 0.0 or solution is None:
         return None
     return replace(solution, steps=spent, products=products)
-
-
-def _with_friction(balance: HarmonicBalance, level: float) -> HarmonicBalance:
-    """The same problem with all coefficients of friction times ten to the level."""
-    if level == 0.0:
-        return balance
-    return replace(balance, contact=balance.contact.with_friction_scaled(10.0**level))

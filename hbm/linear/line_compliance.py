@@ -17,13 +17,6 @@ from tribodyn.reduction.model import ReducedModel
 from tribodyn.reduction.speed_line import SpeedLineModel
 
 
-def line_compliance(model: ReducedModel, *settings: Any) -> LineCompliance:
-    """The compliance of a speed line; settings : the other arguments of `ContactCompliance`."""
-    if not isinstance(model, SpeedLineModel):
-        raise TypeError(f"a speed line is needed, not a {type(model).__name__}")
-    return LineCompliance(model, *settings)
-
-
 class LineCompliance(ContactCompliance):
     """Contact compliance along a line of speeds; what does not ask for a frequency is that of the model itself."""
 

@@ -9,8 +9,10 @@ from tribodyn.hbm.excitation import Excitation
 from tribodyn.hbm.harmonics import HarmonicBasis
 from tribodyn.hbm.linear.compliance import ContactCompliance
 from tribodyn.hbm.linear.flexible_compliance import FlexibleCompliance
+from tribodyn.hbm.linear.line_compliance import LineCompliance
 from tribodyn.reduction.model import ReducedModel
 from tribodyn.reduction.residual_flexibility import FlexibleModel
+from tribodyn.reduction.speed_line import SpeedLineModel
 
 
 class LinearSide(Protocol):
@@ -39,10 +41,8 @@ def compliance_of(
     target_error: float | None = None,
 ) -> ContactCompliance:  # fmt: skip
     """The contact compliance of a model; arguments as for `ContactCompliance`."""
-    if model.follows_frequency:
-        from tribodyn.hbm.linear.line_compliance import line_compliance  # only operating lines of wheels need it
-
-        return line_compliance(model, stiffness, basis, excitation, omega_max, target_error)
+    if isinstance(model, SpeedLineModel):
+        return LineCompliance(model, stiffness, basis, excitation, omega_max, target_error)
     if isinstance(model, FlexibleModel):
         return FlexibleCompliance(model, stiffness, basis, excitation, omega_max, target_error)
     return ContactCompliance(model, stiffness, basis, excitation, omega_max, target_error)

@@ -19,7 +19,8 @@ _compiler: subprocess.Popen[bytes] | None = None
 def start() -> None:
     """Begin to compile, unless the kernels are on disk or this process is one of a pool."""
     global _compiler
-    if _compiler is None and parent_process() is None and not _on_disk():
+    cache_file = getattr(time_step.march._cache, "_cache_file", None)  # none where numba may not write
+    if _compiler is None and parent_process() is None and cache_file is not None and not cache_file._load_index():
         command = [sys.executable, "-m", __name__]
         _compiler = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
 
@@ -49,11 +50,6 @@ def compile_kernels() -> None:
         np.zeros((2, 1, 3)), np.zeros((2, 1, 3)), np.zeros((2, 2)), np.zeros((0, 0)), bits, np.zeros((0, 1, 5, 8))
     )
     time_step.march(step, contact, linear, time_step.Moving(z, x, f, memory, bits, np.zeros(0)), record, space)
-
-
-def _on_disk() -> bool:
-    cache_file = getattr(time_step.march._cache, "_cache_file", None)  # none where numba may not write
-    return cache_file is None or bool(cache_file._load_index())
 
 
 if __name__ == "__main__":

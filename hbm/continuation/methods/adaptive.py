@@ -91,7 +91,7 @@ def follow(
     on_point : called with points done, points expected at the present pace, and the last point
     Returns a Branch; `end` says where it ends and why, and where the response jumped to another branch on the way"""
     options = options or Options()
-    sweep = _begin(parameter.of(problem), start, stop, options)
+    sweep = _AdaptiveSweep(parameter.of(problem), options, start, stop)
     while (end := sweep.advance()) is None:
         sweep.builder.tell(on_point, stop, options.max_points)
     if end.kind is BranchEnd.REACHED:
@@ -99,20 +99,15 @@ def follow(
     return sweep.builder.finish(end)
 
 
-def _begin(path: Parameter, start: float, stop: float, options: Options) -> _AdaptiveSweep:
-    """The first point, from which to follow."""
-    first = None
-    if options.guess is not None:
-        first = newton.solve(*path.place(start), options.guess, options.newton)
-    if first is None or not first.converged:
-        first = solve_along_load(*path.place(start), options.newton)
-    return _AdaptiveSweep(path, options, first, start, stop)
-
-
 class _AdaptiveSweep:
     """The last points, the step to come, and points solved ahead."""
 
-    def __init__(self, path: Parameter, options: Options, first: Solution, start: float, stop: float):
+    def __init__(self, path: Parameter, options: Options, start: float, stop: float):
+        first = None
+        if options.guess is not None:
+            first = newton.solve(*path.place(start), options.guess, options.newton)
+        if first is None or not first.converged:
+            first = solve_along_load(*path.place(start), options.newton)
         self._path, self._options, self._stop = path, options, stop
         self.builder = BranchBuilder(path)
         self.builder.add(start, first)
