@@ -33,6 +33,7 @@ from tribodyn.workflows.scene.matrix_scene import MatrixScene
 from tribodyn.workflows.scene.wheel_scene import WheelScene
 
 ROOT = Path(__file__).parents[1]
+GATHERED = ("parameters", "by_state")  # keys that others are gathered in
 AXES = get_args(Direction)[1]
 BOUNDS = (("gt", "above"), ("ge", "at least"), ("lt", "below"), ("le", "at most"))
 
@@ -97,12 +98,12 @@ def _tables(kind: type[BaseModel], path: tuple[str, ...]) -> Iterator[tuple[tupl
 
 def _is_value(table: type[BaseModel]) -> bool:
     """Whether a table stands for a value that is written as a text or a small inline table."""
-    return table.__name__ in ("Place", "WearStepLimit", "Variable")
+    return table.__name__ in ("Place", "WearStepLimit", "Variable", "StateTable")
 
 
 def _is_key(name: str, field: Any, path: tuple[str, ...]) -> bool:
     table = _inner(field.annotation)
-    return (table is None or _is_value(table)) and name != "parameters"  # gathers keys that a part or a rule declares
+    return (table is None or _is_value(table)) and name not in GATHERED
 
 
 def _inner(annotation: Any) -> type[BaseModel] | None:

@@ -132,6 +132,10 @@ class HarmonicBalance:
         """The same problem with another gap (n_pair,) [m], as wear makes it; everything linear is shared."""
         return replace(self, contact=self.contact.with_gap(np.asarray(gap, float)))
 
+    def worn(self, depth: np.ndarray) -> HarmonicBalance:
+        """The same unworn problem worn by a depth (n_pair,) [m]."""
+        return replace(self, contact=self.contact.worn(depth))
+
     def with_contact(self, contact: JointSet) -> HarmonicBalance:
         """The same problem with other contact parameters; the stuck reference springs stay those of the first."""
         return replace(self, contact=contact)

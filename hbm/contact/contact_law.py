@@ -36,6 +36,7 @@ from types import ModuleType
 import numpy as np
 
 from tribodyn import declarations
+from tribodyn.hbm.contact.aging import Aging
 from tribodyn.plugins import PluginKind
 from tribodyn.refusal import Refusal
 
@@ -50,7 +51,9 @@ class ContactParameters:
     stiffness : (n_pair, n_component) contact springs [N/m], >= 0 and finite
     gap : (n_pair,) opening of the unloaded pair [m], wear adds to it, interference is negative
     numbers : of the law by name, each (n_pair,), in the units that the law declares
-    table : (k, m) of the law, None for none; tabulation : (n_pair, ...) values that the law has computed from it"""
+    table : (k, m) of the law, None for none; tabulation : (n_pair, ...) values that the law has computed from it
+    aging : how they change with wear, None where the gap alone opens; fresh : before any wear, and the depth (n_pair,)
+        that these have by it [m]"""
 
     components: tuple[str, ...]
     stiffness: np.ndarray
@@ -58,6 +61,8 @@ class ContactParameters:
     numbers: Mapping[str, np.ndarray]
     table: np.ndarray | None = None
     tabulation: np.ndarray | None = None
+    aging: Aging | None = None
+    fresh: tuple[ContactParameters, np.ndarray] | None = None
 
     @classmethod
     def of(
@@ -91,7 +96,39 @@ class ContactParameters:
         numbers = {name: value[pairs] for name, value in self.numbers.items()}
         tabulation = None if self.tabulation is None else self.tabulation[pairs]
         stiffness, gap = self.stiffness[pairs], self.gap[pairs]
-        return replace(self, stiffness=stiffness, gap=gap, numbers=numbers, tabulation=tabulation)
+        fresh = None if self.fresh is None else (self.fresh[0].subset(pairs), self.fresh[1][pairs])
+        return replace(self, stiffness=stiffness, gap=gap, numbers=numbers, tabulation=tabulation, fresh=fresh)
+
+    def worn(self, depth: np.ndarray) -> ContactParameters:
+        """These unworn parameters worn by a depth (n_pair,) [m]."""
+        if self.aging is None:
+            return replace(self, gap=self.gap + depth)
+        return replace(self.older(depth), gap=self.gap + (depth - self.aging.debris.bed(depth)))
+
+    def older(self, step: np.ndarray) -> ContactParameters:
+        """The same gap with the numbers of a depth that is larger by a step (n_pair,) [m]."""
+        if self.aging is None:
+            return self
+        base, depth = self.fresh or (self, np.zeros(self.n_pair))
+        factors = self.aging.factors(depth + step)
+        numbers = {name: value * factors.get(name, 1.0) for name, value in base.numbers.items()}
+        by_component = [f"{'normal' if c == 'n' else 'tangential'}_stiffness" for c in self.components]
+        scale = np.stack([factors.get(name, np.ones(self.n_pair)) for name in by_component], axis=1)
+        return replace(self, stiffness=base.stiffness * scale, numbers=numbers, fresh=(base, depth + step))
+
+    @property
+    def bed(self) -> np.ndarray:
+        """(n_pair,) thickness of the worn material in the gap [m]."""
+        if self.aging is None or self.fresh is None:
+            return np.zeros(self.n_pair)
+        return self.aging.debris.bed(self.fresh[1])
+
+    @property
+    def opening_slope(self) -> np.ndarray:
+        """(n_pair,) d gap / d depth."""
+        if self.aging is None or self.fresh is None:
+            return np.ones(self.n_pair)
+        return self.aging.debris.opening_slope(self.fresh[1])
 
     @property
     def tangential(self) -> list[int]:
@@ -198,6 +235,11 @@ def complete(name: str, parameters: ContactParameters) -> ContactParameters:
     n = parameters.n_pair
     numbers = {key: np.array(np.broadcast_to(np.asarray(v, float), (n,))) for key, v in values.items()}
     result, law = replace(parameters, numbers=numbers), load(name)
+    aging = [] if parameters.aging is None else [*parameters.aging.tables]
+    if hasattr(law, "tabulate"):  # from its numbers, once
+        limits = [number.name for number in declared(name) if number.role in declarations.SLIP_LIMITS]
+        if of_others := [number for number in aging if number not in limits]:
+            raise Refusal(f"contact law '{Path(name).stem}': {of_others[0]} cannot change with wear: give one number")
     if hasattr(law, "tabulate"):
         return replace(result, tabulation=law.tabulate(result))
     if parameters.table is not None:

@@ -158,6 +158,7 @@ class JointSet:
 
         numbers = {name: values(name) for name in first.parameters.numbers}
         parameters = replace(first.parameters, stiffness=self.stiffness, gap=self.gap, numbers=numbers)
+        parameters = replace(parameters, aging=None, fresh=None)
         return replace(first, name=user, parameters=parameters, pairs=np.arange(self.n_pair))
 
     def columns(self, joint: Joint) -> np.ndarray:
@@ -235,6 +236,18 @@ class JointSet:
     def with_gap(self, gap: np.ndarray) -> JointSet:
         """The joints with another gap (n_pair,) [m]."""
         return self._with(lambda joint: replace(joint.parameters, gap=gap[joint.rows]))
+
+    def worn(self, depth: np.ndarray) -> JointSet:
+        """These unworn joints worn by a depth (n_pair,) [m]."""
+        return self._with(lambda joint: joint.parameters.worn(depth[joint.rows]))
+
+    def older(self, step: np.ndarray) -> JointSet:
+        """The same gaps with the numbers of a depth that is larger by a step (n_pair,) [m]."""
+        return self._with(lambda joint: joint.parameters.older(step[joint.rows]))
+
+    def of_pairs(self, name: str) -> np.ndarray:
+        """(n_pair,) a property of the parameters of all pairs, such as "bed"."""
+        return self._gather(lambda joint: getattr(joint.parameters, name))
 
     def with_parameters(self, change: Callable[[ContactParameters], ContactParameters]) -> JointSet:
         """The joints with changed parameters."""

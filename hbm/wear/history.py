@@ -66,6 +66,7 @@ class WearRow(_State[float, int]):
     periods: int = 0
     moving: np.ndarray = field(default_factory=lambda: np.zeros(0))
     duty_response: np.ndarray = field(default_factory=lambda: np.zeros(0))
+    bed: np.ndarray | float = 0.0
     memory: Mapping[str, np.ndarray] = field(default_factory=dict)
 
     @property
@@ -109,6 +110,7 @@ class WearHistory(_State[np.ndarray, np.ndarray]):
     moving : (n_row, n) what moved before the row's periods, see hbm.time.mean_motion.Follower; zeros where they began
         in the balance
     duty_response : (n_row, n_duty, n_output, n_coeff) responses of every duty [m]; None where there is one
+    bed : (n_row, n_pair) thickness of the worn material that stays in the gap [m]; None where none does
     memory : what the rule remembers from step to step, arrays (n_row, ...) by name, see the rule; empty where nothing
     scheme : of the steps, a `StepScheme`"""
 
@@ -121,6 +123,7 @@ class WearHistory(_State[np.ndarray, np.ndarray]):
     periods: np.ndarray | None = None
     moving: np.ndarray | None = None
     duty_response: np.ndarray | None = None
+    bed: np.ndarray | None = None
     memory: Mapping[str, np.ndarray] = field(default_factory=dict)
     scheme: str = StepScheme.UNKNOWN.value
 
@@ -128,6 +131,11 @@ class WearHistory(_State[np.ndarray, np.ndarray]):
     def in_time(self) -> np.ndarray:
         """(n_row,) whether the row's motion is one in time that a machine makes, and not that of the balance."""
         return np.zeros(len(self.cycles), bool) if self.periods is None else self.periods > 0
+
+    @property
+    def opening(self) -> np.ndarray:
+        """(n_row, n_pair) what wear adds to the gaps [m]."""
+        return self.depth if self.bed is None else self.depth - self.bed
 
     @property
     def unstable_share(self) -> float | None:
@@ -225,12 +233,14 @@ def history(rows: list[WearRow], end: Outcome[WearEnd], scheme: StepScheme = Ste
     if marched:
         width = max(len(row.moving) for row in rows)
         rows = [replace(row, moving=np.pad(row.moving, (0, width - len(row.moving)))) for row in rows]
+    rows = [replace(row, bed=row.bed + 0 * row.depth) for row in rows]  # rows of a run without one have no field
     columns = {name: np.array([getattr(row, name) for row in rows]) for name in names}
     for name in ("preload_at_rest", "growth"):
         if np.isnan(columns[name]).all():
             del columns[name]
-    if not columns["duty_response"].size:
-        del columns["duty_response"]
+    for name, has_any in (("duty_response", columns["duty_response"].size), ("bed", columns["bed"].any())):
+        if not has_any:
+            del columns[name]
     memory = {name: np.array([row.memory[name] for row in rows]) for name in (rows[0].memory if rows else ())}
     return WearHistory(**columns, end=end, memory=memory, scheme=scheme.value)
 
@@ -245,7 +255,7 @@ def events(
     if "n" not in components or not len(history.cycles):
         return np.zeros(0), np.zeros(0)
     normal = history.displacement[:, components.index("n") :: len(components)]  # (n_row, n_pair, n_coeff)
-    penetration = basis.to_time(normal) - (gap + history.depth)[..., None]
+    penetration = basis.to_time(normal) - (gap + history.opening)[..., None]
     deepest, shallowest = penetration.max(axis=-1), penetration.min(axis=-1)
     return _crossings(history.cycles, shallowest), _crossings(history.cycles, deepest)
 

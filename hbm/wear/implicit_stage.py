@@ -11,12 +11,14 @@ Source  ours"""
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from tribodyn.hbm.balance import HarmonicBalance
 from tribodyn.hbm.contact.contact_law import ContactCycle
+from tribodyn.hbm.contact.joint import JointSet
+from tribodyn.hbm.derivatives.derivative_rules import RULES
 from tribodyn.hbm.linear.compliance_point import CompliancePoint
 from tribodyn.hbm.linearisation import Linearisation
 
@@ -150,7 +152,7 @@ class WearingBalance:
         """First-order change of x when the duties' frequencies move by `moves` [rad/s], the depths following."""
         spread = []
         for balance, omega, part, move in zip(self.balances, state.omegas, self.parts(state.x), moves, strict=True):
-            worn = balance.with_gap(balance.contact.gap + state.depth)
+            worn = balance.worn(state.depth)
             spread.append(move * worn.frequency_slope(worn.evaluate(omega, part))[0])
         change, _, _ = self.linearise(state).solve(-self.at(state.omegas).join(spread), 1e-4)
         return change.reshape(state.x.shape)
@@ -217,17 +219,35 @@ class WearingBalance:
         samples = []
         for share, balance, omega, part in zip(self.shares, self.balances, omegas, parts, strict=True):
             x = part[pairs]
-            contact = balance.contact.subset(pairs).with_gap(balance.contact.gap[pairs] + depth[pairs])
+            contact = balance.contact.subset(pairs).worn(depth[pairs])
             cycle = contact.cycle(x, balance.basis, balance.memory[pairs], omega=omega)
             t = contact.tangential
             if self._normal is None or not balance.basis.has_static:
                 column = np.zeros((len(pairs), cycle.slope.shape[1]))
             else:
-                column = cycle.slope[:, :, self._normal * balance.basis.n_coeff]
+                column = (
+                    cycle.slope[:, :, self._normal * balance.basis.n_coeff] * contact.of_pairs("opening_slope")[:, None]
+                )
+            column = column - slope_by_age(replace(balance, contact=contact, memory=balance.memory[pairs]), x, omega)
             work = share * np.maximum(balance.basis.work_per_cycle(cycle.force, x)[:, t].sum(axis=1), 0.0)
             falls = share * balance.basis.work_per_cycle(column.reshape(x.shape), x)[:, t].sum(axis=1)
             samples.append(_Sample(cycle, column, work, np.where(work > 0, falls, 0.0)))
         return samples
+
+
+def has_aging(contact: JointSet) -> bool:
+    """Whether more than a gap changes with wear."""
+    return any(joint.parameters.aging is not None for joint in contact.joints)
+
+
+def slope_by_age(balance: HarmonicBalance, x: np.ndarray, omega: float) -> np.ndarray:
+    """(n_pair, n_component * n_coeff) d force / d depth [N/m] at the same x and gap, by what else changes with wear."""
+    if not has_aging(balance.contact):
+        return np.zeros((len(x), x[0].size))
+    step = RULES.gap_step * np.abs(x).max(axis=(1, 2), initial=np.finfo(float).tiny)
+    sides = (balance.contact.older(side) for side in (step, -step))
+    up, down = (of.cycle(x, balance.basis, balance.memory, jacobian=False, omega=omega).force for of in sides)
+    return np.asarray((up - down).reshape(len(x), -1) / (2 * step[:, None]))
 
 
 def work_slope(balance: HarmonicBalance, x: np.ndarray, cycle: ContactCycle) -> np.ndarray:
@@ -244,7 +264,7 @@ def work_slope(balance: HarmonicBalance, x: np.ndarray, cycle: ContactCycle) -> 
 class _Sample:
     """Contact cycles of one duty; work [J] and falls = -d work / d depth [N] carry the duty's share.
 
-    column : (n_pair, n_component * n_coeff) d force / d (static normal displacement) = -d force / d depth [N/m]"""
+    column : (n_pair, n_component * n_coeff) -d force / d depth [N/m]; of a gap d force / d (static normal motion)"""
 
     cycle: ContactCycle
     column: np.ndarray

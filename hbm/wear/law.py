@@ -7,7 +7,7 @@ declares in `class Parameters` with their units, see `tribodyn.declarations`."""
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -16,6 +16,7 @@ import numpy as np
 
 from tribodyn import declarations
 from tribodyn.hbm.balance import ROUNDING
+from tribodyn.hbm.contact.aging import Aging, EnergyByDepth, NumberTable
 from tribodyn.plugins import PluginKind
 from tribodyn.refusal import Refusal
 
@@ -30,10 +31,12 @@ class JointWear:
     """How a joint wears.
 
     law : name of a wear law, or path of its file
-    numbers : the law's own, scalars or (n_pair,) of the joint, in the units that the law declares"""
+    numbers : the law's own before any wear, scalars or (n_pair,) of the joint, in the units that the law declares
+    tables : how they change with wear, by their names"""
 
     law: str
     numbers: Mapping[str, np.ndarray | float]
+    tables: Mapping[str, NumberTable] = field(default_factory=dict)
 
     @classmethod
     def of(cls, law: str, **numbers: np.ndarray | float) -> JointWear:
@@ -42,6 +45,25 @@ class JointWear:
         Raises  ValueError where there is no such law, or a number is missing, unknown or out of its limits"""
         values = declarations.complete(declared(law), numbers, f"wear law '{Path(law).stem}'")
         return cls(law, values)
+
+    @property
+    def energy(self) -> EnergyByDepth:
+        """Friction work per area by depth.
+
+        Raises  Refusal where the law is not that of energy, or its coefficient goes with the depth"""
+        table = self.tables.get("coefficient")
+        if self.law != "energy" or (table is not None and table.over == "depth"):
+            raise Refusal(
+                'over = "energy_density" needs the wear law energy with a constant coefficient or one over '
+                'energy_density, which tell the work from the depth: give over = "depth"'
+            )
+        return EnergyByDepth(float(np.mean(self.numbers["coefficient"])), table)
+
+    def at(self, depth: np.ndarray) -> dict[str, np.ndarray | float]:
+        """The numbers of pairs worn by a depth (n_pair,) [m]."""
+        by_energy = any(table.over == "energy_density" for table in self.tables.values())
+        aging = Aging(self.tables, self.energy if by_energy else None)
+        return {**self.numbers, **{name: self.numbers[name] * f for name, f in aging.factors(depth).items()}}
 
 
 @dataclass(frozen=True)

@@ -81,7 +81,8 @@ def solve_first_stage(
     guess, ahead = [], GAMMA * stride
     for duty, point in zip(problem.mission, state.points, strict=True):
         balance = problem.in_duty(duty, state.depth)
-        guess.append(point.state.x + balance.gap_response(point.state, ahead * state.rate))
+        opening = ahead * state.rate * balance.contact.of_pairs("opening_slope")
+        guess.append(point.state.x + balance.gap_response(point.state, opening))
     omega = np.array([point.state.omega for point in state.points]) + ahead * drift
     return _stage(problem, state, state.depth, ahead, state.cycles + ahead, guess, omega, searches)
 
@@ -163,7 +164,9 @@ def depth_per_work(problem: WearProblem, state: WearState) -> np.ndarray:
         if np.any(rate[~works] > 0):
             raise Refusal(f'wear law "{wear.law}" wears pairs without friction work: take rule = "thesis"')
         coefficient = name_of(Role.WEAR_COEFFICIENT, wear_law.declared(wear.law))
-        reference = (np.ones(len(pairs)) if coefficient is None else problem.numbers(name)[coefficient]) / area[pairs]
+        reference = (
+            np.ones(len(pairs)) if coefficient is None else problem.numbers(name, state.depth[pairs])[coefficient]
+        ) / area[pairs]
         usable = works & (reference > 0)
         factor = np.mean(rate[usable] / (work[usable] * reference[usable])) if usable.any() else 1.0
         gain[pairs] = np.divide(rate, work, out=factor * reference, where=works)

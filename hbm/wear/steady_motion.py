@@ -194,6 +194,7 @@ class SteadyMotion:
         if not touches.all():
             stiffness = stiffness - coupled @ np.linalg.lstsq(separated, coupled.T, rcond=None)[0]
         fall[np.ix_(touches, touches)] = (state.rate[touches] / force[touches])[:, None] * stiffness
+        fall *= self._problem.in_duty(self._problem.mission[0], state.depth).contact.of_pairs("opening_slope")
         return fall
 
 

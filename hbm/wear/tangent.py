@@ -34,7 +34,7 @@ from tribodyn.hbm.newton import RULES as NEWTON
 from tribodyn.hbm.threads import single
 from tribodyn.hbm.wear.harmonic_fallback import top_harmonic
 from tribodyn.hbm.wear.history import LARGEST_SHIFT, LIFE_SHARE, StepScheme, WearHistory, WearRow, cycles_to_preload
-from tribodyn.hbm.wear.implicit_stage import WearingBalance
+from tribodyn.hbm.wear.implicit_stage import WearingBalance, slope_by_age
 from tribodyn.hbm.wear.run_end import PreloadAtRest
 from tribodyn.hbm.wear.sdirk_stages import GAMMA, FrequencySearch, initial_guess, solve_first_stage
 from tribodyn.hbm.wear.step_memory import StepMemory
@@ -183,7 +183,8 @@ class Tangent:
         force, x, rate_by_x, *rates = zip(*(cycle.slopes(n) for cycle in cycles), strict=True)
         force, x, rate_by_x = (np.concatenate(part, axis=1) for part in (force, x, rate_by_x))
         rate, by_gap, by_depth = (np.sum(part, axis=0) for part in rates)
-        rate = rate + by_gap[:, None] * self.opens
+        rate, contact = rate + by_gap[:, None] * self.opens, cycles[0].balance.contact
+        opening = contact.of_pairs("opening_slope")[:, None]
         rate[:, n_change + len(self.by_law)] += state.rate
         slope = stretch * rate_by_x / (1 - stretch * by_depth)[:, None]
         depth = (base + stretch * rate) / (1 - stretch * by_depth)[:, None]
@@ -195,25 +196,30 @@ class Tangent:
         jac, n_coeff, components = solved.cycle.slope, solved.x.shape[2], problem.balance.contact.components
         normal = components.index("n") * n_coeff
         gap = -jac[:, :, normal :: len(components) * n_coeff].sum(axis=2)
-        opened = force + gap[..., None] * (depth + self.opens)[:, None]
+        worn = gap * opening + np.concatenate(
+            [slope_by_age(c.balance, c.solved.x, c.solved.omega) for c in cycles], axis=1
+        )
+        opened = force + gap[..., None] * self.opens[:, None] + worn[..., None] * depth[:, None]
         right = [
             x_part.reshape(-1, n_coeff) - side.apply(f.reshape(-1, n_coeff))
             for x_part, f in zip(np.moveaxis(x, 2, 0), np.moveaxis(opened, 2, 0), strict=True)
         ]
         moving = [cycle for cycle in cycles if not isinstance(cycle.duty.site, AtFrequency)]
         right += [side.join([(c is m) * -c.balance.frequency_slope(c.solved)[0] for c in cycles]) for m in moving]
-        wearing = replace(solved.cycle, jacobian=jac + gap[:, :, None] * slope[:, None, :])
+        wearing = replace(solved.cycle, jacobian=jac + worn[:, :, None] * slope[:, None, :])
         columns = _solved(stage.linearise(replace(solved, cycle=wearing)), right)
         dx, by_omega = np.split(columns.reshape(*gap.shape, -1), [n], axis=2)
         depth = depth + np.einsum("pc,pcn->pn", slope, dx)
         if moving:
             moves = np.stack([cycle.moves() for cycle in moving])
-            by_pair, turn = moves[:, n_change:], np.einsum("pc,pcn->pn", slope, by_omega)
-            omega = by_pair @ (depth + self.opens)
-            omega[:, :n_change] += moves[:, :n_change]
-            omega = np.linalg.solve(np.eye(len(moving)) - by_pair @ turn, omega)
+            n_own, turn = n_change + len(self.by_law), np.einsum("pc,pcn->pn", slope, by_omega)
+            own, by_opening, by_age = np.split(moves, [n_own, n_own + len(gap)], axis=1)
+            by_wear = by_opening * opening.T + by_age
+            omega = by_wear @ depth + by_opening @ self.opens
+            omega[:, :n_own] += own
+            omega = np.linalg.solve(np.eye(len(moving)) - by_wear @ turn, omega)
             depth, dx = depth + turn @ omega, dx + by_omega @ omega
-        force_change = force + jac @ dx + gap[..., None] * (depth + self.opens)[:, None]
+        force_change = force + jac @ dx + gap[..., None] * self.opens[:, None] + worn[..., None] * depth[:, None]
         rate = rate + by_depth[:, None] * depth + np.einsum("pc,pcn->pn", rate_by_x, dx)
         return depth, rate, force_change[problem.pairs, normal].sum(axis=0)
 
@@ -227,15 +233,7 @@ def _by_numbers(
     for name, joints in numbers.values():
         value = problem.wearing[joints[0]].numbers[name]
         step = RULES.law_step * float(np.max(value))
-        laws = [
-            {
-                of: replace(law, numbers={**law.numbers, name: value + s})
-                for of, law in problem.wearing.items()
-                if of in joints
-            }
-            for s in (step, -step)
-        ]
-        up, down = (replace(problem, wear={**problem.wearing, **changed}) for changed in laws)
+        up, down = (problem.with_number(name, value + s, joints) for s in (step, -step))
         pairs.append((up, down, step))
     return tuple(pairs)
 

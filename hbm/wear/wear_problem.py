@@ -11,6 +11,7 @@ import numpy as np
 from tribodyn.hbm import newton
 from tribodyn.hbm.balance import HarmonicBalance, State
 from tribodyn.hbm.contact.contact_law import SEPARATES
+from tribodyn.hbm.contact.joint import Joint
 from tribodyn.hbm.continuation.operating_condition import OperatingCondition
 from tribodyn.hbm.continuation.operating_point import OperatingPoint
 from tribodyn.hbm.newton import lead
@@ -86,11 +87,21 @@ class WearProblem:
             return {joint.name: self.wear for joint in joints}
         return {self.balance.contact.joint(name).name: wear for name, wear in self.wear.items()}
 
-    def numbers(self, joint: str) -> dict[str, np.ndarray]:
-        """The own numbers of a joint's wear law, each (n_pair,) of the joint."""
+    def numbers(self, joint: str, depth: np.ndarray | None = None) -> dict[str, np.ndarray]:
+        """The own numbers of a joint's wear law, each (n_pair,) of the joint, at a depth (n_pair,) of it [m]."""
         n = len(self.balance.contact.joint(joint).rows)
-        declared = self.wearing[joint].numbers
-        return {name: np.array(np.broadcast_to(np.asarray(v, float), (n,))) for name, v in declared.items()}
+        numbers = self.wearing[joint].at(np.zeros(n) if depth is None else depth)
+        return {name: np.array(np.broadcast_to(np.asarray(v, float), (n,))) for name, v in numbers.items()}
+
+    def with_number(self, name: str, value: np.ndarray | float, joints: Sequence[str]) -> WearProblem:
+        """The problem with another value of a number of the wear law of some joints."""
+        wear = {
+            joint: replace(law, numbers={**law.numbers, name: value}) if joint in joints else law
+            for joint, law in self.wearing.items()
+        }
+        contact = self.balance.contact
+        contact = replace(contact, joints=tuple(_aging_by(joint, wear.get(joint.name)) for joint in contact.joints))
+        return replace(self, wear=wear, balance=self.balance.with_contact(contact))
 
     @cached_property
     def pairs(self) -> np.ndarray:
@@ -108,8 +119,16 @@ class WearProblem:
     def in_duty(self, duty: Duty, depth: np.ndarray | None = None) -> HarmonicBalance:
         """The problem of a duty with its loads, worn by a depth (n_pair,) [m]; unworn by default."""
         unworn = self.balance if duty.balance is None else duty.balance
-        worn = unworn if depth is None else unworn.with_gap(unworn.contact.gap + depth)
+        worn = unworn if depth is None else unworn.worn(depth)
         return worn.with_load(duty.load)
+
+
+def _aging_by(joint: Joint, wear: JointWear | None) -> Joint:
+    """A joint whose age by friction work goes with a wear law."""
+    aging = joint.parameters.aging
+    if wear is None or aging is None or aging.energy is None:
+        return joint
+    return replace(joint, parameters=replace(joint.parameters, aging=replace(aging, energy=wear.energy)))
 
 
 @dataclass(frozen=True)
@@ -213,7 +232,7 @@ def wear_of(
     rate, work = np.zeros_like(depth), np.zeros_like(depth)
     for name, wear in problem.wearing.items():
         pairs = balance.contact.joint(name).rows
-        of_joint = (problem.area[pairs], problem.numbers(name), depth[pairs])
+        of_joint = (problem.area[pairs], problem.numbers(name, depth[pairs]), depth[pairs])
         exposure = wear_law.Exposure(balance, solved, *of_joint, cycles, name, motion)
         rate[pairs], work[pairs] = wear_law.depth_rate(wear.law, exposure), exposure.energy
     return rate, work
@@ -227,8 +246,8 @@ def _neighbour(
     known_depth: np.ndarray,
     depth: np.ndarray,
 ) -> OperatingPoint:
-    omega, opening = previous.state.omega, depth - known_depth
-    before = problem.in_duty(duty, known_depth)
+    omega, before = previous.state.omega, problem.in_duty(duty, known_depth)
+    opening = (depth - known_depth) * before.contact.of_pairs("opening_slope")
     guess = previous.state.x + before.gap_response(before.evaluate(omega, previous.state.x), opening)
     point = duty.site.solve_near(balance, omega, guess)
     if point.solution.converged:
@@ -251,7 +270,8 @@ def follow_balance(problem: WearProblem, before: WearState, depth: np.ndarray, c
     for duty, previous in zip(problem.mission, before.points, strict=True):
         omega, x = previous.state.omega, previous.state.x
         previous_balance, balance = problem.in_duty(duty, before.depth), problem.in_duty(duty, depth)
-        guess = x + previous_balance.gap_response(previous.state, depth - before.depth)
+        opening = (depth - before.depth) * previous_balance.contact.of_pairs("opening_slope")
+        guess = x + previous_balance.gap_response(previous.state, opening)
         solved = newton.solve(balance, omega, guess, duty.site.newton)
         if not solved.converged:
             solved = replace(previous.solution, state=balance.evaluate(omega, x))

@@ -46,6 +46,7 @@ def row_of(
         duty_response=np.stack([p.response for p in state.points]) if len(state.points) > 1 else np.zeros(0),
         preload_at_rest=state.preload_at_rest,
         growth=state.growth,
+        bed=balance.contact.of_pairs("bed"),
     )
     means = state.means
     if means is None:

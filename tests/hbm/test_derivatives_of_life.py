@@ -7,15 +7,13 @@ import numpy as np
 import pytest
 from scipy.optimize import brentq
 
-from tests.helpers.pressed_body import balance_of, growth_by_few_modes, pressed_body, wear_problem
-from tests.helpers.steps_again import EXACT, elasticity_anew
+from tests.helpers.pressed_body import balance_of, growth_by_few_modes, pressed_body, wear_problem, with_factor
+from tests.helpers.steps_again import EXACT, derivatives_of_life, elasticity_anew
 from tribodyn.hbm.balance import HarmonicBalance
 from tribodyn.hbm.continuation.operating_condition import AtPeakRatio
 from tribodyn.hbm.continuation.operating_point import AtFrequency
 from tribodyn.hbm.continuation.resonance_peak import AtPeak
 from tribodyn.hbm.derivatives.derivative_rules import NoDerivative
-from tribodyn.hbm.derivatives.parameter_change import BalanceInputs, ParameterChange
-from tribodyn.hbm.wear import tangent
 from tribodyn.hbm.wear.law import JointWear
 from tribodyn.hbm.wear.rules import error_controlled, thesis
 from tribodyn.hbm.wear.run_end import PreloadAtRest
@@ -23,7 +21,7 @@ from tribodyn.hbm.wear.step_control import Tolerance
 from tribodyn.hbm.wear.wear_loop import evolve
 from tribodyn.hbm.wear.wear_problem import Duty, WearProblem, assess
 
-SHARE, STEP, LOADS = 0.2, 1e-6, ("press", "shake")
+SHARE, LOADS = 0.2, ("press", "shake")
 AT = AtFrequency("tip", 420.0, EXACT)
 PEAK = replace(AtPeak("tip", 250.0, 1200.0, newton=EXACT), tolerance=1e-7)
 
@@ -38,36 +36,19 @@ def few_modes():
 def problem_of(site, name="", factor=1.0, **changes) -> WearProblem:
     """The problem with one of its numbers times a factor; gaps open by (factor - 1) 0.1 mm."""
     balance = balance_of(pressed_body(), (0, 1))
-
-    def changed(p):
-        springs = [factor if name == of else 1.0 for of in ("t1", "t2", "n")]
-        numbers = {of: factor * value if name == of else value for of, value in p.numbers.items()}
-        return replace(p, numbers=numbers, stiffness=p.stiffness * np.array(springs))
-
     if name in LOADS:
         loads = {of: factor * value if of[1] == name else value for of, value in balance.excitation.loads.items()}
         excitation = replace(balance.excitation, loads=loads)
         balance = HarmonicBalance.of(balance.model, balance.contact.joints, balance.basis, excitation, 1500.0)
-    elif name == "gap":
-        balance = balance.with_gap(balance.contact.gap + 1e-4 * (factor - 1))
     else:
-        balance = balance.with_contact(balance.contact.with_parameters(changed))
+        balance = with_factor(balance, name, factor)
     coefficient = 1e-9 * (factor if name == "coefficient" else 1.0)
     inputs = {"mission": (Duty(site),), "lost_below": SHARE, "wear": JointWear.of("energy", coefficient=coefficient)}
     return wear_problem(balance=balance, **(inputs | changes))
 
 
 def found_of(problem, worn, site, names, share=SHARE, numbers=None):
-    built = BalanceInputs.of(problem.balance)
-
-    def posed(name, factor):
-        changed = problem_of(site, name, factor).balance
-        return (
-            replace(built, excitation=changed.excitation) if name in LOADS else replace(built, contact=changed.contact)
-        )
-
-    changes = [ParameterChange(name, STEP, *(posed(name, 1 + side) for side in (STEP, -STEP))) for name in names]
-    return tangent.of_life(problem, worn, changes, numbers or {"coefficient": ("coefficient", ["contact"])}, share)
+    return derivatives_of_life(problem, worn, partial(problem_of, site), names, share, numbers)
 
 
 @pytest.mark.parametrize(("rule", "site", "names"), [

@@ -63,6 +63,19 @@ def wear_problem(**changes: object) -> WearProblem:
     return WearProblem(**(inputs | changes))
 
 
+def with_factor(balance: HarmonicBalance, name: str, factor: float) -> HarmonicBalance:
+    """The balance with a spring or a number of its law times a factor; gaps open by (factor - 1) 0.1 mm."""
+
+    def changed(p: ContactParameters) -> ContactParameters:
+        springs = [factor if name == of else 1.0 for of in ("t1", "t2", "n")]
+        numbers = {of: factor * value if name == of else value for of, value in p.numbers.items()}
+        return replace(p, numbers=numbers, stiffness=p.stiffness * np.array(springs))
+
+    if name == "gap":
+        return balance.with_gap(balance.contact.gap + 1e-4 * (factor - 1))
+    return balance.with_contact(balance.contact.with_parameters(changed))
+
+
 @contextmanager
 def growth_by_few_modes() -> Iterator[None]:
     """Hill's method with four modes instead of twenty and more: most of a wear run's time on so small a body."""
@@ -70,8 +83,8 @@ def growth_by_few_modes() -> Iterator[None]:
         yield
 
 
-def life(worn: WearHistory) -> float:
-    """Cycles to 2 % of the first preload."""
-    result = cycles_to_preload(worn, 0.02)
+def life(worn: WearHistory, share: float = 0.02) -> float:
+    """Cycles to a share of the first preload."""
+    result = cycles_to_preload(worn, share)
     assert result is not None
     return result

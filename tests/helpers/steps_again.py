@@ -4,13 +4,15 @@ from dataclasses import replace
 
 import numpy as np
 
+from tribodyn.hbm.derivatives.parameter_change import BalanceInputs, ParameterChange
 from tribodyn.hbm.newton import NewtonOptions
+from tribodyn.hbm.wear import tangent
 from tribodyn.hbm.wear.history import StepScheme
 from tribodyn.hbm.wear.sdirk_stages import FrequencySearch, initial_guess, solve_stages
 from tribodyn.hbm.wear.wear_problem import assess
 from tribodyn.hbm.wear.wear_rows import state_of
 
-EXACT = NewtonOptions(tolerance=1e-12)
+EXACT, STEP = NewtonOptions(tolerance=1e-12), 1e-6
 
 
 def exactly(problem, **site):
@@ -54,3 +56,10 @@ def elasticity_anew(worn, share, problem_of, guess):
         longer -= (again(problem, worn, end, longer)[1] - remaining) / slope
         sides.append(again(problem, worn, end, longer)[0])
     return (sides[0] - sides[1]) / (2 * h) / values
+
+
+def derivatives_of_life(problem, worn, build, names, share, numbers=None):
+    """By numbers of contact and loads, and of the wear law; build : name, factor on its number -> problem."""
+    sides = {name: [BalanceInputs.of(build(name, 1 + side).balance) for side in (STEP, -STEP)] for name in names}
+    changes = [ParameterChange(name, STEP, *pair) for name, pair in sides.items()]
+    return tangent.of_life(problem, worn, changes, numbers or {"coefficient": ("coefficient", ["contact"])}, share)

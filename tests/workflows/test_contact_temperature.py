@@ -5,16 +5,16 @@ import pytest
 from tribodyn.workflows.scene.scene_file import SceneError, SceneFile, read
 
 ROOT = "contacts.root_right"
-BARE = ("friction", "tangential_stiffness", "normal_stiffness")
-TABLE = (
-    f'{ROOT}.by_temperature={{temperature=["0 K", "400 K", "800 K"], friction=[0.5, 0.4, 0.2], '
-    'tangential_stiffness=["1000 N/um", "900 N/um", "600 N/um"], '
-    'normal_stiffness=["1200 N/um", "1200 N/um", "800 N/um"]}'
+OVER = 'over="temperature", at=["0 K", "400 K", "800 K"], values='
+TABLES = (
+    f"{ROOT}.friction={{{OVER}[0.5, 0.4, 0.2]}}",
+    f'{ROOT}.tangential_stiffness={{{OVER}["1000 N/um", "900 N/um", "600 N/um"]}}',
+    f'{ROOT}.normal_stiffness={{{OVER}["1200 N/um", "1200 N/um", "800 N/um"]}}',
 )
 
 
 def turbine(*changes: str) -> SceneFile:
-    return read("turbine", (*(f"{ROOT}.{name}=" for name in BARE), TABLE, *changes))
+    return read("turbine", (*TABLES, *changes))
 
 
 def numbers(file: SceneFile, joint: str = "root_right") -> tuple[float, float | None, float | None]:
@@ -48,14 +48,16 @@ def test_a_scene_that_was_written_out_reads_again() -> None:
 
 
 @pytest.mark.parametrize(("changes", "said"), [
-    ((f"{ROOT}.temperature=900 K",), r"at 900 K, but by_temperature goes from 0 to 800 K: extend it"),
-    ((f"{ROOT}.friction=0.4",), r"contacts\.root_right\.friction: by_temperature gives it too"),
-    ((f"{ROOT}.by_temperature.friction=[0.5, 0.4]",), "friction: give 3 values, one for each temperature"),
-    ((f'{ROOT}.by_temperature.temperature=["0 K", "9 K", "5 K"]',), "ascending order"),
-    ((f"{ROOT}.by_temperature.friction=[0.5, 0.4, -0.2]",), "friction: expected a value at least 0"),
-    ((f"{ROOT}.by_temperature.fricton=[0.5, 0.4, 0.2]",), "did you mean friction"),
+    ((f"{ROOT}.temperature=900 K",), r"at 900 K, but its table goes from 0 to 800 K: extend it"),
+    ((f"{ROOT}.friction.values=[0.5, 0.4]",), "one of `values` for each"),
+    ((f'{ROOT}.friction.at=["0 K", "9 K", "5 K"]',), "ascending order"),
+    ((f"{ROOT}.friction.values=[0.5, 0.4, -0.2]",), r"friction.values: expected a value at least 0"),
+    ((f'{ROOT}.friction.over="heat"',), r"friction.over: Input should be 'depth', 'energy_density' or 'temperature'"),
+    ((f"{ROOT}.by_state={{}}",), "by_state"),
+    ((f"{ROOT}.friction={{over='depth', at=[0, 1e-6], values=[0.5, 0]}}",), "values above 0"),
+    (('wear.coefficient={over="temperature", at=["0 K"], values=[1e-15]}',), 'expected "depth" or "energy_density"'),
     (('loads.static.map={field="t.csv"}',), "give the contact's own temperature"),
-    (("contacts.root_left.temperature=400 K",), "is for by_temperature, which is not there"),
+    (("contacts.root_left.temperature=400 K",), "is for numbers over"),
 ])  # fmt: skip
 def test_what_cannot_be_is_one_sentence(changes: tuple[str, ...], said: str) -> None:
     with pytest.raises(SceneError, match=said):

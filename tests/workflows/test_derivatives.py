@@ -29,10 +29,10 @@ COARSE = {
     "blade": (*BLADE, "response.method=adaptive"),
     "rig": (*RIG, LOCATED),
 }
-HOT = 'contact.by_temperature={temperature=["0 K", "200 K", "400 K"], friction=[0.5, 0.45, 0.3], ' + (
-    'tangential_stiffness=["470 N/um", "440 N/um", "350 N/um"]}'
-)
-HOT_BEAM = (*COARSE["beam"], "wear=", "contact.friction=", "contact.tangential_stiffness=", HOT)
+OVER = 'over="temperature", at=["0 K", "200 K", "400 K"], values='
+HOT = (f"contact.friction={{{OVER}[0.5, 0.45, 0.3]}}", "contact.tangential_stiffness="
+       f'{{{OVER}["470 N/um", "440 N/um", "350 N/um"]}}')  # fmt: skip
+HOT_BEAM = (*COARSE["beam"], "wear=", *HOT)
 COARSE["warmed beam"] = (*HOT_BEAM, 'loads.static.hot={temperature="150 K"}', "material.expansion='1e-5 1/K'")
 AT_800_HZ = (*BEAM, "wear.motion=balance", "wear.at=800 Hz", LOCATED)
 

@@ -14,7 +14,7 @@ from tribodyn.workflows.scene import scene_file
 from tribodyn.workflows.scene.json_schema import json_schema
 
 NAMED = {"static", "harmonic", "contacts", "bodies", "materials", "faces", "face_sizes", "ties", "others", "fixed_axes"}
-NAMED |= {"prescribed", "springs", "motion", "patterns", "decks", "by_temperature"}
+NAMED |= {"prescribed", "springs", "motion", "patterns", "decks"}
 
 
 @pytest.fixture(scope="module")

@@ -278,11 +278,9 @@ def test_where_entries_lie(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> N
 
 
 def test_another_temperature_of_a_contact_reduces_nothing() -> None:
-    table = {"temperature": ["0 K", "400 K"], "friction": [0.5, 0.4]}
-    text = ", ".join(f"{name}={value}" for name, value in table.items()).replace("'", '"')
+    table = 'contact.friction={over="temperature", at=["0 K", "400 K"], values=[0.5, 0.4]}'
     cold, hot = (
-        scene_file.read("beam", (*TINY, "contact.friction=", f"contact.by_temperature={{{text}}}", *extra)).mesh_scene
-        for extra in ((), ("contact.temperature=300 K",))
+        scene_file.read("beam", (*TINY, table, *extra)).mesh_scene for extra in ((), ("contact.temperature=300 K",))
     )
     assert cold.joints["contact"].numbers != hot.joints["contact"].numbers
     assert values_through(cold, REDUCTION) == values_through(hot, REDUCTION)

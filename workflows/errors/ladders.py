@@ -158,7 +158,7 @@ def _of_stiffness(scene: Scene) -> list[Setting]:
         f"{f'contacts.{name}' if name in getattr(scene, 'contacts', ()) else 'contact'}.{key}": value
         for name, contact in scene.joints.items()
         for key in ("tangential_stiffness", "normal_stiffness")
-        if (value := getattr(contact, key)) is not None and getattr(contact, "by_temperature", None) is None
+        if (value := getattr(contact, key)) is not None and key not in contact.by_state
     }
     if not keys:
         return []

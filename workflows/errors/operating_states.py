@@ -126,7 +126,7 @@ def worn_state(file: SceneFile, balance: HarmonicBalance, result: Result, row: i
     assert wear is not None
     duty = settings.mission(file.scene)[0]
     basis = HarmonicBasis(result.harmonics, balance.basis.n_samples)
-    worn = balance.with_gap(balance.contact.gap + wear.depth[row]).with_load(duty.load)
+    worn = balance.worn(wear.depth[row]).with_load(duty.load)
     x = balance.shaped(basis.transfer(wear.displacement[row], balance.basis))
     point = duty.site.solve_near(worn, float(wear.omega[row]), x)
     return require_solved(OperatingState(float(wear.cycles[row]), worn, duty.site, point))

@@ -83,7 +83,7 @@ def motion_maps(result: Result, rows: Sequence[int] | np.ndarray | None = None) 
     fields: list[Row] = [(colors, []) for colors in (MOTION_MAP, PRESSURE_MAP, WEAR_MAP)]
     for row in rows:
         x = wear.displacement[row].reshape(len(patch.area), -1, basis.n_coeff)
-        slide, gap = slide_and_gap(patch.components, x, basis, patch.gap + wear.depth[row])
+        slide, gap = slide_and_gap(patch.components, x, basis, patch.gap + wear.opening[row])
         for (_, line), name, values, unit_of in zip(
             fields,
             ("largest slide along the face", "largest gap", "friction work"),

@@ -79,7 +79,7 @@ SCHEMA: dict[str, tuple[type, Arrays]] = {
         ("wear", WearHistory, {
             "row": "cycles cycles_in_step preload:N omega:rad/s amplitude:m solves step_error preload_at_rest:N growth "
                    "spread mean_error is_stationary periods",
-            "row pair": "depth:m worn:m energy:J normal_force:N status work:J",
+            "row pair": "depth:m worn:m energy:J normal_force:N status work:J bed:m",
             "row contact coefficient": "force:N", "row output coefficient": "response:m", "row moving": "moving",
             "row duty": "duty_omega:rad/s", "row duty contact coefficient": "duty_displacement:m",
             "row duty output coefficient": "duty_response:m",

@@ -79,7 +79,7 @@ def hysteresis_loops(balance: HarmonicBalance, states: States, numbers: np.ndarr
     shape = (balance.contact.n_pair, -1, balance.basis.n_coeff)
     displacement, force = [], []
     for s in states:
-        contact = balance.contact.with_gap(balance.contact.gap + s.depth)
+        contact = balance.contact.worn(s.depth)
         x, f = contact.history(s.displacement.reshape(shape), balance.basis, balance.memory, s.omega)
         displacement.append(x)
         force.append(f)

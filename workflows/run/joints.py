@@ -1,5 +1,6 @@
 """From the tables of a scene to its joints with their laws and springs, and to what excites the model."""
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -9,14 +10,18 @@ from tribodyn.fem.interface import ContactInterface
 from tribodyn.fem.material import Material
 from tribodyn.fem.part import Part
 from tribodyn.hbm.contact import contact_law
+from tribodyn.hbm.contact.aging import Aging, DebrisBed, NumberTable
 from tribodyn.hbm.contact.joint import Joint
 from tribodyn.hbm.contact.stiffness import rectangular_punch
 from tribodyn.hbm.excitation import Excitation
+from tribodyn.hbm.wear.law import JointWear
 from tribodyn.reduction.model import ReducedModel
 from tribodyn.refusal import Refusal
 from tribodyn.workflows.run import decks, scene_assembly
 from tribodyn.workflows.scene.contact import ContactTable, FaceContact
 from tribodyn.workflows.scene.schema import CENTRIFUGAL, MeshScene, Scene
+from tribodyn.workflows.scene.user_files import LawTable
+from tribodyn.workflows.scene.wear import JointWearTable
 
 
 def contact_stiffness(scene: Scene, reduced: ReducedModel) -> np.ndarray:
@@ -77,6 +82,36 @@ def elastic(scene: Scene, face: str) -> tuple[float, float]:
     return solid.E, solid.nu
 
 
+def wear_table_of(scene: Scene, name: str = "") -> JointWearTable:
+    """How a joint of a scene that wears does so: its own table, or that of all."""
+    own = getattr(scene.joints.get(name), "wear", None)
+    return scene.wear_table if own is None else own
+
+
+def wear_of(scene: Scene, name: str = "") -> JointWear:
+    """The wear law of a joint of a scene that wears."""
+    table = wear_table_of(scene, name)
+    return replace(JointWear.of(table.law_name, **table.numbers), tables=_over_wear(table))
+
+
+def _over_wear(table: LawTable) -> dict[str, NumberTable]:
+    """The tables over the state of worn pairs."""
+    states = {name: state for name, state in table.by_state.items() if state.over != "temperature"}
+    return {name: NumberTable(state.over, state.at, state.values) for name, state in states.items()}
+
+
+def aging_of(scene: Scene, name: str) -> Aging | None:
+    """What changes of a joint as it wears; None where its gap alone opens."""
+    if scene.wear is None:
+        return None
+    tables, debris = _over_wear(scene.joints[name]), wear_table_of(scene, name).debris
+    if not tables and debris is None:
+        return None
+    by_energy = any(table.over == "energy_density" for table in tables.values())
+    bed = DebrisBed() if debris is None else DebrisBed(debris.retained, debris.thickness or np.inf)
+    return Aging(tables, wear_of(scene, name).energy if by_energy else None, bed)
+
+
 def make_joints(scene: Scene, reduced: ReducedModel) -> list[Joint]:
     """Every joint with its law and that law's parameters."""
     springs, interface = contact_stiffness(scene, reduced), reduced.interface
@@ -85,6 +120,7 @@ def make_joints(scene: Scene, reduced: ReducedModel) -> list[Joint]:
         contact = scene.joints[name]
         columns = [interface.components.index(c) for c in contact.components]
         parameters = parameters_of(contact, interface, pairs, springs[pairs][:, columns])
+        parameters = replace(parameters, aging=aging_of(scene, name))
         made_joints.append(Joint(name, contact.law_name, parameters, pairs))
     if not made_joints:  # a structure that touches nothing: a joint of no pairs
         zeros: dict[str, Any] = {number.name: 0.0 for number in contact_law.declared("jenkins")}

@@ -126,7 +126,7 @@ def worn_responses(
     rows = np.unique([int(np.argmin(np.abs(volume - v))) for v in volumes])
     branches = []
     for i, row in enumerate(rows):
-        worn = balance.with_gap(balance.contact.gap + wear.depth[row])
+        worn = balance.worn(wear.depth[row])
         advance(i / len(rows), f"{i + 1} of {len(rows)}")
         branches.append(follow(worn))
     size = max(len(curve.omega) for curve in branches)

@@ -11,7 +11,6 @@ from tribodyn.hbm.continuation.resonance_peak import AtPeak
 from tribodyn.hbm.outcome import WearEnd
 from tribodyn.hbm.wear import wear_rule
 from tribodyn.hbm.wear.history import LIFE_SHARE, WearHistory, WearRow, history, rows_to_resume
-from tribodyn.hbm.wear.law import JointWear
 from tribodyn.hbm.wear.wear_loop import evolve
 from tribodyn.hbm.wear.wear_problem import Duty, WearProblem
 from tribodyn.hbm.wear.wear_rule import RuleSettings, WearRule
@@ -21,6 +20,7 @@ from tribodyn.workflows.result.result import Result
 from tribodyn.workflows.run import references, settings
 from tribodyn.workflows.run.checkpoint import Keeper
 from tribodyn.workflows.run.full_fields import with_shown
+from tribodyn.workflows.run.joints import wear_of, wear_table_of
 from tribodyn.workflows.run.modelling import Model
 from tribodyn.workflows.run.progress import Advance
 from tribodyn.workflows.scene.scene_file import SceneFile
@@ -99,10 +99,8 @@ def wear_problem(
 
     lost_below : share of the first preload at which the run ends, of that at rest where `at_rest`"""
     table = scene.wear_table
-    of_all = JointWear.of(table.law_name, **table.numbers)
-    own = {name: c.wear for name, c in scene.joints.items() if isinstance(c, NamedContact) and c.wear is not None}
-    by_name = {name: JointWear.of(t.law_name, **t.numbers) for name, t in own.items()}
-    wear = dict.fromkeys(scene.joints, of_all) | by_name if own else of_all
+    own = any(wear_table_of(scene, name) is not table for name in scene.joints)
+    wear = {name: wear_of(scene, name) for name in scene.joints} if own else wear_of(scene)
     area = balance.model.interface.area
     vibrating, resting = (0.0, lost_below) if at_rest else (lost_below, None)
     any_joint = table.lost_of == "any"

@@ -7,9 +7,10 @@ from types import ModuleType
 from typing import Annotated, Any, ClassVar, Literal, Self
 
 import numpy as np
-from pydantic import ConfigDict, Field, StrictBool, StrictInt, ValidationInfo, field_validator, model_validator
+from pydantic import Field, StrictBool, StrictInt, ValidationInfo, field_validator, model_validator
 
 from tribodyn import declarations
+from tribodyn.declarations import Number
 from tribodyn.hbm.contact import contact_law
 from tribodyn.refusal import Refusal
 from tribodyn.text_file import text_of
@@ -38,59 +39,15 @@ def rows_of(path: Path) -> list[list[float]]:
     return rows
 
 
-class ByTemperature(Table, stage=CONTACT):
-    """Numbers of a contact at several changes of temperature, linear between them; refused beyond their ends.
-
-    Numbers of the contact's law, such as its coefficient of friction, are further keys, each with a value for every
-    temperature."""
-
-    model_config = ConfigDict(extra="allow")
-    NUMBERS_STAGE: ClassVar[SceneStage] = CONTACT
-
-    temperature: Annotated[tuple[TemperatureChange, ...], Field(min_length=1)]
-    """Changes of temperature, ascending, counted as those of the loads."""
-    tangential_stiffness: tuple[Annotated[Stiffness, Field(ge=0)], ...] | None = None
-    """Tangential stiffness of the contact at each."""
-    normal_stiffness: tuple[Annotated[Stiffness, Field(ge=0)], ...] | None = None
-    """Normal stiffness of the contact at each."""
-
-    @model_validator(mode="after")
-    def _columns(self) -> ByTemperature:
-        if any(np.diff(self.temperature) <= 0):
-            raise Refusal("temperature: give the changes of temperature in ascending order")
-        if not self.columns:
-            raise Refusal("give numbers of the contact at each temperature, such as normal_stiffness")
-        for name, values in self.columns.items():
-            if len(values) != len(self.temperature):
-                raise Refusal(f"{name}: give {len(self.temperature)} values, one for each temperature")
-        return self
-
-    @property
-    def columns(self) -> dict[str, tuple[float, ...]]:
-        """The values of each number by its name."""
-        stiffness = {"tangential_stiffness": self.tangential_stiffness, "normal_stiffness": self.normal_stiffness}
-        return {name: values for name, values in (self.numbers | stiffness).items() if values is not None}
-
-    @property
-    def numbers(self) -> dict[str, tuple[float, ...]]:
-        return {name: tuple(values) for name, values in (self.model_extra or {}).items()}
-
-    def at(self, temperature: float) -> dict[str, float]:
-        """The numbers at a change of temperature [K]; refuses one beyond the ends."""
-        low, high = self.temperature[0], self.temperature[-1]
-        if not low <= temperature <= high:
-            raise Refusal(
-                f"the contact is at {temperature:g} K, but by_temperature goes from {low:g} to {high:g} K: extend it"
-            )
-        return {name: float(np.interp(temperature, self.temperature, values)) for name, values in self.columns.items()}
-
-
 class ContactTable(LawTable):
     """The contact law of every node pair; stiffness is that of all pairs together, shared by their area."""
 
     TABLE: ClassVar[str] = "contact"
     NUMBERS_STAGE: ClassVar[SceneStage] = CONTACT
     LAWS: ClassVar[ModuleType] = contact_law
+    OTHERS: ClassVar[tuple[Number, ...]] = tuple(
+        Number(name, "N/m", above=0.0) for name in ("tangential_stiffness", "normal_stiffness")
+    )
 
     components: Annotated[tuple[Literal["t1", "t2", "n"], ...], PART] = ("t1", "t2", "n")
     """Contact components that are modelled."""
@@ -188,15 +145,13 @@ class FaceContact(ContactTable, stage=PART):
     numbers."""
 
     temperature: Annotated[TemperatureChange | None, CONTACT, SMOOTH] = None
-    """Change of temperature of the contact, for `by_temperature`; by default the mean over its two bodies of what
+    """Change of temperature of the contact, for numbers over it; by default the mean over its two bodies of what
     static loads heat them by."""
-    by_temperature: ByTemperature | None = None
-    """Friction and stiffness at several temperatures, instead of numbers of this table."""
 
     @model_validator(mode="after")
     def _temperature_is_for_a_table(self) -> Self:
-        if self.temperature is not None and self.by_temperature is None:
-            raise Refusal(f"{self.TABLE}.temperature is for by_temperature, which is not there: leave it out")
+        if self.temperature is not None and all(table.over != "temperature" for table in self.by_state.values()):
+            raise Refusal(f'{self.TABLE}.temperature is for numbers over = "temperature": leave it out')
         return self
 
     @model_validator(mode="after")

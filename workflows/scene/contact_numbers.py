@@ -7,73 +7,33 @@ from functools import lru_cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from pydantic import ValidationError
-
 from tribodyn import declarations
 from tribodyn.declarations import Role
 from tribodyn.hbm.contact import contact_law
 from tribodyn.refusal import Refusal
-from tribodyn.workflows.scene.contact import ByTemperature, ContactTable, Surfaces
-from tribodyn.workflows.scene.fields import Table, TemperatureChange, unknown_key
-from tribodyn.workflows.scene.user_files import in_si, is_user_file
+from tribodyn.workflows.scene.contact import Surfaces
+from tribodyn.workflows.scene.units import to_si
+from tribodyn.workflows.scene.user_files import is_user_file
 
 if TYPE_CHECKING:  # most scenes name no faces and start sooner without
     from tribodyn.geometry.height_map import HeightMap
 
 
-class _TemperatureKeys(Table):
-    temperature: TemperatureChange | None = None
-    by_temperature: ByTemperature
+def is_by_temperature(contact: Any) -> bool:
+    """Whether a contact, as it stands in the file, has a number over its temperature, which it does not give."""
+    if not isinstance(contact, Mapping) or "temperature" in contact:
+        return False
+    return any(isinstance(value, Mapping) and value.get("over") == "temperature" for value in contact.values())
 
 
-class _HeatedLoad(Table):
-    temperature: TemperatureChange
+def with_temperature(key: str, contact: Mapping[str, Any], static: Any) -> dict[str, Any]:
+    """The table of a contact as it stands in the file, with its temperature.
 
-
-def with_numbers_by_temperature(
-    key: str, contact: Mapping[str, Any], static: Any, folder: Path | None
-) -> dict[str, Any]:
-    """The table of a contact as it stands in the file, with the numbers of its temperature.
-
-    key : of the contact; static : the table of the static loads
-    folder : of the scene, None for the scene of a result, whose numbers are in SI units
-    Raises  Refusal where its temperature is not known or a number is given twice"""
-    table = {name: contact[name] for name in ("temperature", "by_temperature") if name in contact}
-    if folder is not None and isinstance(table["by_temperature"], Mapping):
-        table["by_temperature"] = _in_si(f"{key}.by_temperature", table["by_temperature"], contact, folder)
+    key : of the contact; static : the table of the static loads; raises Refusal where its temperature is not known"""
     try:
-        read = _TemperatureKeys.model_validate(table)
-    except ValidationError as error:  # before the numbers that it should have given are missed
-        first = error.errors()[0]
-        where = ".".join(str(part) for part in (key, *first["loc"]))
-        raise Refusal(f"{where}: {first['msg'].removeprefix('Value error, ')}") from None
-    try:
-        values = read.by_temperature.at(_mean_change(contact, static) if read.temperature is None else read.temperature)
+        return {**contact, "temperature": _mean_change(contact, static)}
     except Refusal as error:
         raise Refusal(f"{key}: {error}") from None
-    # a scene that was written out has the numbers beside the table
-    repeated = [name for name, value in values.items() if contact.get(name, value) not in (None, value)]
-    if repeated:
-        raise Refusal(f"{key}.{repeated[0]}: by_temperature gives it too: leave one of them out")
-    return {**contact, **table, **values}
-
-
-def _in_si(key: str, table: Mapping[str, Any], contact: Mapping[str, Any], folder: Path) -> dict[str, Any]:
-    """A table by temperature whose numbers of the law are in SI units."""
-    general, law = ByTemperature.model_fields, contact.get("law", "")
-    if not isinstance(law, str):
-        return dict(table)  # refused where the contact is read
-    declared = {number.name: number for number in ContactTable.declared_numbers(contact, folder)}
-    result = dict(table)
-    for name, values in table.items():
-        if name in general:
-            continue
-        if name not in declared:
-            raise Refusal(unknown_key(f"{key}.{name}", [*general, *declared]))
-        if not isinstance(values, list | tuple):
-            raise Refusal(f"{key}.{name}: expected a list with one value for each temperature, got {values!r}")
-        result[name] = [in_si(f"{key}.{name}", declared[name], value) for value in values]
-    return result
 
 
 def _mean_change(contact: Mapping[str, Any], static: Any) -> float:
@@ -87,8 +47,8 @@ def _mean_change(contact: Mapping[str, Any], static: Any) -> float:
         if "field" in load:
             raise Refusal("a field of temperatures heats its bodies: give the contact's own temperature")
         try:
-            change = _HeatedLoad.model_validate({"temperature": load["temperature"]}).temperature
-        except ValidationError:  # reported where the load is read
+            change = to_si(load["temperature"], "K")
+        except Refusal:  # reported where the load is read
             continue
         for body in bodies & set(load.get("bodies", bodies)):
             changes[body] += change

@@ -78,7 +78,10 @@ class _Generator(GenerateJsonSchema):
         if issubclass(kind, LawTable):
             files = {name: read(kind.LAWS.file_of(name)) for name in kind.LAWS.KIND.names()}
             _with_own(schema_of_table, "law", files)
-            keys.pop("parameters", None)  # of a wear rule, whose numbers are keys of the table
+            for name in ("parameters", "by_state"):  # of a wear rule, over a state: keys of the table
+                keys.pop(name, None)
+            for number in {n.name: n for own in (*files.values(), kind.OTHERS) for n in own}.values():
+                keys[number.name] = {**keys[number.name], "type": ["number", "string", "object"]}
         elif "parameters" in keys:
             del keys["parameters"]
             _with_own(schema_of_table, "part", {name: read(parts.file_of(name)) for name in parts.names()})

@@ -14,7 +14,12 @@ from pydantic import Field, ValidationError, ValidationInfo, model_validator
 
 from tribodyn.refusal import Refusal
 from tribodyn.workflows.scene.contact import ContactTable, FaceContact, Surfaces
-from tribodyn.workflows.scene.contact_numbers import needs_asperities, with_asperities, with_numbers_by_temperature
+from tribodyn.workflows.scene.contact_numbers import (
+    is_by_temperature,
+    needs_asperities,
+    with_asperities,
+    with_temperature,
+)
 from tribodyn.workflows.scene.fields import DRAW, REDUCTION, SceneStage, Table, unknown_key
 from tribodyn.workflows.scene.load_tables import HarmonicLoad, Loads, Motion, Prescribed, SpringTable, StaticLoad
 from tribodyn.workflows.scene.part_tables import Geometry, SolidMaterial
@@ -204,9 +209,9 @@ class MeshScene(Scene):
         prefix = "contacts." if named_contacts is contacts else ""
         static = loads.get("static") if isinstance(loads, dict) else None
         completed = {
-            name: with_numbers_by_temperature(prefix + name, contact, static, folder)
+            name: with_temperature(prefix + name, contact, static)
             for name, contact in contacts.items()
-            if isinstance(contact, dict) and contact.get("by_temperature") is not None
+            if is_by_temperature(contact)
         }
         lacking = [name for name, contact in contacts.items() if needs_asperities(contact)]
         if lacking and folder is not None and isinstance(data.get("surfaces"), dict):

@@ -6,13 +6,14 @@ Reading, planning and showing a scene read the text of such a file and never run
 from collections.abc import Iterable, Mapping
 from pathlib import Path
 from types import ModuleType
-from typing import Any, ClassVar, Self
+from typing import Any, ClassVar, Literal, Self
 
-from pydantic import ConfigDict, PrivateAttr, ValidationInfo, model_validator
+import numpy as np
+from pydantic import ConfigDict, Field, PrivateAttr, ValidationError, ValidationInfo, model_validator
 
 from tribodyn.declarations import Number, Role, name_of, read
 from tribodyn.refusal import Refusal
-from tribodyn.workflows.scene.fields import Table, UsualRange, unknown_key
+from tribodyn.workflows.scene.fields import WEAR, Table, UnknownKey, UsualRange, unknown_key
 from tribodyn.workflows.scene.units import to_si
 
 ANY_UNIT = ("m", "rad", "")  # units that a number without a declared unit may have
@@ -91,6 +92,51 @@ def optional_user_file(folder: Path | None, name: str | None, key: str) -> Path 
     return None if folder is None or name is None or not is_user_file(name) else user_file(folder, name, key)
 
 
+STATES = {"depth": "m", "energy_density": "J/m2", "temperature": "K"}  # of a contact, with their units
+
+
+class StateTable(Table, stage=WEAR):
+    """A number over the state of a contact, in the place of the number: linear between rows."""
+
+    over: Literal["depth", "energy_density", "temperature"]
+    """Wear depth of a pair, friction work per area that it has done, or temperature change of the contact."""
+    at: tuple[float, ...] = Field(min_length=1)
+    """States, ascending."""
+    values: tuple[float, ...]
+    """The number at each."""
+
+    @classmethod
+    def read(cls, key: str, number: Number, table: Mapping[str, Any]) -> Self:
+        """A table as it stands in the file, in SI units; key : of the scene, for sentences."""
+        unit = STATES.get(str(table.get("over")))
+        at, values = table.get("at"), table.get("values")
+        if unit is not None and isinstance(at, list | tuple) and isinstance(values, list | tuple):
+            at = [in_si(f"{key}.at", Number("at", unit), value) for value in at]
+            table = {**table, "at": at, "values": [in_si(f"{key}.values", number, value) for value in values]}
+        try:
+            return cls.model_validate(table)
+        except ValidationError as error:
+            first = error.errors()[0]
+            place = ".".join(str(part) for part in (key, *first["loc"]))
+            raise Refusal(f"{place}: {first['msg'].removeprefix('Value error, ')}") from None
+
+    @model_validator(mode="after")
+    def _rows(self) -> Self:
+        if any(np.diff(self.at) <= 0) or len(self.values) != len(self.at):
+            raise Refusal("expected states `at` in ascending order, and one of `values` for each")
+        if self.over != "temperature" and (self.at[0] < 0 or min(self.values) <= 0):
+            raise Refusal("expected states of at least 0 and values above 0")
+        return self
+
+    def start(self, temperature: float) -> float:
+        """The number before any wear, at a change of temperature [K]; refuses one beyond the rows."""
+        at = temperature if self.over == "temperature" else 0.0
+        if self.over == "temperature" and not self.at[0] <= at <= self.at[-1]:
+            ends = f"{self.at[0]:g} to {self.at[-1]:g} K"
+            raise Refusal(f"the contact is at {at:g} K, but its table goes from {ends}: extend it")
+        return float(np.interp(at, self.at, self.values))
+
+
 class LawTable(Table):
     """A table that names a law; the numbers of the law are further keys of it."""
 
@@ -99,8 +145,12 @@ class LawTable(Table):
     """Its key in a scene."""
     LAWS: ClassVar[ModuleType]
     """Module that finds the file of a law of the package by `file_of(name)`."""
+    OTHERS: ClassVar[tuple[Number, ...]] = ()
+    """Numbers of the table itself that may be tables over a state, too."""
 
     law: str
+    by_state: dict[str, StateTable] = Field(default_factory=dict)
+    """Tables over a state that stand in the file in the place of numbers."""
     _user_file: Path | None = PrivateAttr(None)
 
     @model_validator(mode="before")
@@ -109,11 +159,34 @@ class LawTable(Table):
         folder, fields = folder_of(info), cls.model_fields
         if folder is None or not isinstance(table, dict):
             return table
+        if "by_state" in table:
+            raise UnknownKey("by_state", [name for name in fields if name != "by_state"])
+        if isinstance(table.get("law", ""), str):
+            table = cls._with_starts(table, folder)
         general = {name: value for name, value in table.items() if name in fields}
         values = {name: value for name, value in table.items() if name not in fields}
         if not isinstance(general.get("law", ""), str):
             return general  # refused by the field itself
         return general | numbers(f"{cls.TABLE}.", cls.declared_numbers(general, folder), values, fields)
+
+    @classmethod
+    def _with_starts(cls, table: dict[str, Any], folder: Path) -> dict[str, Any]:
+        """A table as it stands in the file with its tables over a state apart, and the numbers before any wear."""
+        declared = {number.name: number for number in (*cls.declared_numbers(table, folder), *cls.OTHERS)}
+        tables = {
+            name: StateTable.read(f"{cls.TABLE}.{name}", declared[name], value)
+            for name, value in table.items()
+            if name in declared and isinstance(value, Mapping) and "over" in value
+        }
+        temperature = to_si(table.get("temperature", 0.0), "K") if tables else 0.0
+        for name, state in tables.items():
+            if state.over == "temperature" and "temperature" not in cls.model_fields:
+                raise Refusal(f'{cls.TABLE}.{name}.over: expected "depth" or "energy_density"')
+            try:
+                table = {**table, name: state.start(temperature)}
+            except Refusal as error:
+                raise Refusal(f"{cls.TABLE}.{name}: {error}") from None
+        return {**table, "by_state": tables} if tables else table
 
     @classmethod
     def declared_numbers(cls, table: Mapping[str, Any], folder: Path) -> tuple[Number, ...]:

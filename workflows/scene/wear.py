@@ -11,7 +11,7 @@ from pydantic import BeforeValidator, Field, PrivateAttr, StrictInt, ValidationE
 from tribodyn.declarations import Role, read
 from tribodyn.hbm.wear import law as wear_law, wear_rule
 from tribodyn.refusal import Refusal
-from tribodyn.workflows.scene.fields import DRAW, RESUMABLE, WEAR, Frequency, Number, SceneStage, Table
+from tribodyn.workflows.scene.fields import DRAW, RESUMABLE, WEAR, Frequency, Length, Number, SceneStage, Table
 from tribodyn.workflows.scene.units import to_si
 from tribodyn.workflows.scene.user_files import (
     LawTable,
@@ -126,6 +126,15 @@ class MissionDuty(Table, stage=WEAR):
     """Speed of the wheel meanwhile; `wheel.speed` by default."""
 
 
+class Debris(Table, stage=WEAR):
+    """Worn material that stays in the gap as a bed, until it is ejected."""
+
+    retained: Annotated[Number, Field(ge=0, le=1)]
+    """Share of what is worn that stays in an empty gap."""
+    thickness: Annotated[Length, Field(gt=0)] | None = None
+    """Thickness of the bed that is ejected as fast as it is fed; without, nothing of it is ejected."""
+
+
 class JointWearTable(LawTable, stage=WEAR):
     """How one joint wears."""
 
@@ -136,6 +145,8 @@ class JointWearTable(LawTable, stage=WEAR):
     law: str = "energy"
     """Name of a wear law, or a file my_law.py beside the scene; its own numbers, such as coefficient, are further keys
     of this table."""
+    debris: Debris | None = None
+    """Bed of worn material in the gap."""
 
 
 class Wear(JointWearTable, stage=WEAR):

@@ -284,7 +284,7 @@ def _start(
             raise Refusal(f"the result has no wear row {row}: it has {f'0 to {len(rows) - 1}' if rows else 'none'}")
         worn = rows[row]
         load = settings.mission(scene)[0].load if scene.wear is not None else 1.0
-        balance = unworn.with_gap(unworn.contact.gap + worn.depth).with_load(load)
+        balance = unworn.worn(worn.depth).with_load(load)
         return balance, worn.omega, _carried(worn.displacement, basis, balance)
     frf = result.response
     good = [] if frf is None else np.flatnonzero(frf.converged).tolist()
