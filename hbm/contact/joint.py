@@ -157,8 +157,7 @@ class JointSet:
             return self._gather(lambda joint: joint.parameters.numbers[name])
 
         numbers = {name: values(name) for name in first.parameters.numbers}
-        parameters = replace(first.parameters, stiffness=self.stiffness, gap=self.gap, numbers=numbers)
-        parameters = replace(parameters, aging=None, fresh=None)
+        parameters = ContactParameters(first.parameters.components, self.stiffness, self.gap, numbers)
         return replace(first, name=user, parameters=parameters, pairs=np.arange(self.n_pair))
 
     def columns(self, joint: Joint) -> np.ndarray:

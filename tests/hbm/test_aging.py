@@ -8,7 +8,6 @@ import pytest
 from scipy.integrate import cumulative_trapezoid, quad
 
 from tests.helpers.pressed_body import (
-    N_PAIR,
     balance_of,
     growth_by_few_modes,
     life,
@@ -17,11 +16,9 @@ from tests.helpers.pressed_body import (
     with_factor,
 )
 from tests.helpers.steps_again import EXACT, derivatives_of_life, elasticity_anew
-from tribodyn.hbm import newton
 from tribodyn.hbm.contact.aging import Aging, DebrisBed, EnergyByDepth, NumberTable
 from tribodyn.hbm.continuation.operating_point import AtFrequency
 from tribodyn.hbm.continuation.resonance_peak import AtPeak
-from tribodyn.hbm.wear.implicit_stage import WearingBalance
 from tribodyn.hbm.wear.law import JointWear
 from tribodyn.hbm.wear.rules import error_controlled, thesis
 from tribodyn.hbm.wear.steady_motion import SteadyMotion
@@ -60,16 +57,14 @@ def aged(tables, wear_tables, debris=DebrisBed(), site=AT, name="", factor=1.0, 
     return replace(problem, balance=with_factor(problem.balance.with_contact(contact), name, factor))
 
 
-@pytest.mark.parametrize("rule", [
-    lambda p: thesis.Rule(p, 1e-5), lambda p: error_controlled.Rule(p, Tolerance(0.1, 2e-4)),
-], ids=["thesis", "error_controlled"])  # fmt: skip
-def test_constant_tables_and_a_bed_that_loses_all_change_no_bit(rule) -> None:
+def test_constant_tables_and_a_bed_that_loses_all_change_no_bit() -> None:
     constant = {name: replace(table, values=(table.values[0],) * len(table.values)) for name, table in TABLES.items()}
     flat = {"coefficient": replace(FALLING["coefficient"], values=(1.0, 1.0))}
-    plain = evolve(rule(wear_problem(mission=(Duty(AT),), lost_below=SHARE)))
-    aging = evolve(rule(aged(constant, flat)))
+    problems = wear_problem(mission=(Duty(AT),), lost_below=SHARE), aged(constant, flat)
     names = ("cycles", "depth", "work", "preload", "omega", "force", "solves", "duty_displacement")
-    assert all(np.array_equal(getattr(plain, name), getattr(aging, name)) for name in names)
+    for rule, step in ((thesis.Rule, 1e-5), (error_controlled.Rule, Tolerance(0.1, 2e-4))):
+        plain, aging = (evolve(rule(problem, step)) for problem in problems)
+        assert all(np.array_equal(getattr(plain, name), getattr(aging, name)) for name in names)
 
 
 def test_a_bed_that_loses_nothing_keeps_the_preload() -> None:
@@ -89,8 +84,7 @@ def test_what_is_worn_is_in_the_bed_or_ejected() -> None:
 
 
 def test_the_work_follows_from_the_depth() -> None:
-    work = np.linspace(0.0, 6e5, 200_001)
-    table = NumberTable("energy_density", (0.0, 1e5, 3e5), (2.0, 1.0, 4.0))
+    work, table = np.linspace(0.0, 6e5, 200_001), NumberTable("energy_density", (0.0, 1e5, 3e5), (2.0, 1.0, 4.0))
     depth = cumulative_trapezoid(COEFFICIENT * table.factor(work, work), work, initial=0.0)
     np.testing.assert_allclose(EnergyByDepth(COEFFICIENT, table).of(depth), work, rtol=1e-8)
     with pytest.raises(Refusal, match='give over = "depth"'):
@@ -128,17 +122,6 @@ def test_running_in_stiffens_and_damps_less() -> None:
     worn = evolve(error_controlled.Rule(problem, Tolerance(0.03, 2e-4)), 4)
     assert np.all(np.diff(worn.omega) > 0)
     assert np.all(np.diff(worn.omega**2 * worn.amplitude) > 0)
-
-
-def test_wear_inside_the_balance_has_the_derivative_of_finite_differences() -> None:
-    balance = aged(TABLES, FALLING, BED).balance
-    base = np.array([0.0, 1e-5, 2e-5, 0.0])
-    wearing = WearingBalance([balance], (1.0,), base, 3000.0, np.full(N_PAIR, 1e-5), base)
-    x = newton.solve(wearing, (420.0,), newton.solve(balance, 420.0, balance.stuck(420.0)).state.x).state.x
-    direction = np.random.default_rng(1).normal(size=x.shape) * 1e-6 * np.abs(x).max()
-    fore, back = (wearing.evaluate((420.0,), x + sign * direction).residual for sign in (1, -1))
-    exact = wearing.linearise(wearing.evaluate((420.0,), x)).product(direction.reshape(-1, x.shape[2]))
-    assert np.abs((fore - back) / 2 - exact).max() < 1e-5 * np.abs(exact).max()
 
 
 @pytest.mark.parametrize(("site", "names"), [
