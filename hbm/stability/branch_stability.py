@@ -33,6 +33,11 @@ class Bifurcation:
     value: float
     kind: str
 
+    @property
+    def frequency(self) -> float:
+        """Frequency [Hz], of a branch that was followed in frequency."""
+        return self.value / (2 * np.pi)
+
 
 @dataclass(frozen=True)
 class BranchStability:
@@ -53,6 +58,11 @@ class BranchStability:
     def known(self) -> np.ndarray:
         """(n_point,) whether Hill's method or time integration decides."""
         return np.isfinite(self.growth)
+
+    @property
+    def bifurcations(self) -> tuple[Bifurcation, ...]:
+        """The bifurcations one by one."""
+        return tuple(map(Bifurcation, self.position.tolist(), self.omega.tolist(), self.kinds))
 
 
 @single

@@ -369,7 +369,7 @@ def text(folder, content):
     (lambda f: text(f, "%%MatrixMarket matrix coordinate real general\n2 2 9\n1 1 1.0\n"), "broken Matrix Market"),
     (lambda f: text(f, "1,1,1,1,2.0\n1,1,oops\n"), "not numbers"),
     (lambda f: text(f, "1,1,1.5,1,2.0\n"), "not whole"),
-    (lambda f: text(f, "1,1,nan,1,2.0\n"), "not whole"),
+    (lambda f: text(f, "1,1,nan,1,2.0\n"), "no format known"),
     (lambda f: text(f, "1,1,1e300,1,2.0\n"), "not whole"),
     (lambda f: text(f, "t\n1 1 1 1\nCSA 2 2 3 0\n(1I4) (1I4) (1E9.1)\n"), "type CSA"),
     (lambda f: text(f, "t\n9 3 3 3\nRSA 2 2 3 0\n(1I4) (1I4) (1E9.1)\n1\n3\n"), "ends after 6 of 13 lines"),
