@@ -3,13 +3,27 @@
 import numpy as np
 import pytest
 
-from tests.helpers.steel_asperities import ALL, E_STAR, FACE, MU, POISSON, RADIUS, STEEL, YOUNG, G, moving
 from tribodyn.hbm.contact import aft, contact_law
 from tribodyn.hbm.contact.asperity import asperity, heights, pressure
 from tribodyn.hbm.contact.bed_table import bed_springs
 from tribodyn.hbm.contact.contact_law import SEPARATES, SLIPS, STICKS, ContactParameters
 from tribodyn.hbm.contact.laws import rough
 from tribodyn.hbm.harmonics import HarmonicBasis
+
+YOUNG, POISSON, RADIUS, MU = 192.31e9, 0.3, 1.36493e-3, 0.3
+E_STAR, G = YOUNG / (2 * (1 - POISSON**2)), YOUNG / (2 * (1 + POISSON))
+STEEL = {"young": YOUNG, "poisson": POISSON, "radius": RADIUS, "yield_stress": 331.7e6, "tangent_modulus": 620e6}
+ALL = ("t1", "t2", "n")
+HEIGHTS = np.linspace(0, 28e-6, 101)
+FACE = np.column_stack([HEIGHTS, 1.4e6 * np.exp(-0.5 * ((HEIGHTS - 14e-6) / 4e-6) ** 2) / (4e-6 * np.sqrt(2 * np.pi))])
+
+
+def moving(n_pair: int, n_comp: int, basis: HarmonicBasis, seed: int) -> np.ndarray:
+    """Displacements that deepen the contact, slip in part, and nearly open it."""
+    rng = np.random.default_rng(seed)
+    x = rng.normal(size=(n_pair, n_comp, basis.n_coeff)) * 10 ** rng.uniform(-9, -6.3, (n_pair, 1, 1))
+    x[:, -1, 0] = rng.uniform(6e-6, 9e-6, n_pair)
+    return x
 
 
 def one_asperity(**numbers: float) -> ContactParameters:
