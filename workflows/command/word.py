@@ -9,7 +9,7 @@ import inspect
 import json
 import re
 import sys
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from os import PathLike
 from pathlib import Path
@@ -28,7 +28,7 @@ from tribodyn.workflows.scene.fields import Quantity
 from tribodyn.workflows.studies.study_result import DefectInRuns, StudyResult
 
 NAMES = {"start": "--from", "stop": "--to", "overrides": "--set"}
-Into = Literal["results", "beside", "pictures", "here", "asked"]
+Into = Literal["results", "pictures", "here", "asked"]
 SUPPLIED = ("progress", "folder", "overrides")  # parameters that are not given as options of their own names
 Overrides = Annotated[
     tuple[str, ...],
@@ -48,7 +48,7 @@ class Option:
     """A parameter of a study as an option of its word.
 
     by_position : whether the study takes it by position; unit : of a quantity, None for what is none
-    is_repeated : whether it takes several values, by name where `by_name`"""
+    is_repeated : whether it takes several values"""
 
     name: str
     hint: Any
@@ -56,7 +56,6 @@ class Option:
     by_position: bool
     unit: str | None = None
     is_repeated: bool = False
-    by_name: bool = False
 
     @classmethod
     def of(cls, parameter: inspect.Parameter, hint: Any) -> Option:
@@ -64,8 +63,7 @@ class Option:
         unit = next((mark.unit for mark in _marks(hint) if isinstance(mark, Quantity)), None)
         bare = _not_none(get_args(_not_none(hint))[0] if get_origin(_not_none(hint)) is Annotated else _not_none(hint))
         origin, by_position = get_origin(bare), parameter.kind is not inspect.Parameter.KEYWORD_ONLY
-        is_repeated = origin in (Sequence, Mapping)
-        return cls(parameter.name, bare, parameter.default, by_position, unit, is_repeated, origin is Mapping)
+        return cls(parameter.name, bare, parameter.default, by_position, unit, origin is Sequence)
 
     @property
     def positional(self) -> bool:
@@ -81,8 +79,7 @@ class Option:
     @property
     def flag(self) -> str:
         """Such as --points; several values are given one at a time, under the name of one."""
-        repeated = self.by_name or (self.is_repeated and self.unit is None)
-        name = self.name.removesuffix("s") if repeated else self.name
+        name = self.name.removesuffix("s") if self.is_repeated and self.unit is None else self.name
         return NAMES.get(self.name, f"--{name.replace('_', '-')}")
 
     def parameter(self, meaning: str) -> inspect.Parameter:
@@ -94,9 +91,9 @@ class Option:
             return inspect.Parameter(self.name, place, default=self.default, annotation=annotation)
         kind, default = self._kind or self.hint, self.default
         is_integer = self.is_repeated and get_args(self.hint)[:1] == (int,)
-        if self.by_name or (self.is_repeated and self.unit is None):
+        if self.is_repeated and self.unit is None:
             kind, default = tuple[int, ...] if is_integer else tuple[str, ...], default if required else default or ()
-        elif self.unit is not None or kind == float | str:
+        elif self.unit is not None:
             kind, default = str, f"{default:g} {self.unit}".strip() if isinstance(default, (int, float)) else default
         if default is None:
             kind = kind | None
@@ -109,25 +106,17 @@ class Option:
         """What the study takes."""
         if texts is None or self.unit is None:
             return texts
-        if self.by_name:
-            return dict(self._named(text) for text in texts)
         if self.is_repeated:
             return tuple(quantity(self.flag, text.strip(), self.unit) for text in texts.split(","))
         return quantity(self.flag, texts, self.unit)
-
-    def _named(self, text: str) -> tuple[str, float]:
-        name, equals, value = text.partition("=")
-        if not equals:
-            raise Refusal(f"{self.flag} {text}: give a name and its value, such as name=1")
-        return name.strip(), quantity(f"{self.flag} {name.strip()}", value.strip(), self.unit or "")
 
 
 def word(study: Callable[..., Any], words: str, *, into: Into = "results") -> Callable[..., None]:
     """Make the function behind a word of the command line.
 
     words : such as "curve backbone"
-    into : default folder of tables and pictures where --out is not given: results/NAME, the folder of the result, its
-        pictures/, the folder of the file, or none"""
+    into : default folder of tables and pictures where --out is not given: results/NAME, pictures/ of the result, the
+        folder of the file, or none"""
     hints = get_type_hints(study, include_extras=True)
     parameters = inspect.signature(study).parameters
     options = [Option.of(p, hints[name]) for name, p in parameters.items() if name not in SUPPLIED]
@@ -201,7 +190,6 @@ def group(name: str, *words: Any) -> App:
 QUIET = Annotated[Flag, Parameter(help="Print no progress.")]
 _OUT = {
     "results": "Folder of tables and pictures; results/NAME by default.",
-    "beside": "Folder of tables and pictures; that of the result by default.",
     "pictures": "Folder of tables and pictures; pictures/ beside the result by default.",
     "here": "Folder of what is written; that of the file by default.",
     "asked": "Folder of tables and pictures; none are written by default.",
@@ -255,8 +243,7 @@ def _folder(first: Any, into: str) -> Path | None:
         return None if into == "asked" else Path(first).parent
     if into == "results":
         return Path("results") / (Path(first).name.removesuffix(".toml") if first is not None else "study")
-    result_folder = store.result_file(first).parent
-    return result_folder / "pictures" if into == "pictures" else result_folder
+    return store.result_file(first).parent / "pictures"
 
 
 def _not_none(hint: Any) -> Any:

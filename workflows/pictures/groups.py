@@ -52,10 +52,7 @@ def draw(solids: Sequence[Body], path: Path, max_groups: int = 20) -> Path:
         entries = [(label, COLOURS[i % len(COLOURS)]) for i, label in enumerate(labels)]
         tall = min(0.05 * len(entries) + 0.02, 0.95)
         view.add_legend(entries, bcolor=PAPER, face="rectangle", size=(0.95, tall), loc="center left")
-    if path.suffix.lower() == ".png":
-        view.screenshot(str(path))
-    else:
-        view.save_graphic(str(path))
+    view.screenshot(str(path))
     view.close()
     return path
 
