@@ -8,7 +8,6 @@ from time import process_time
 import matplotlib as mpl
 import numpy as np
 from matplotlib.figure import Figure
-from matplotlib.ticker import LogLocator, NullFormatter, StrMethodFormatter
 from threadpoolctl import threadpool_limits
 
 from tribodyn.hbm.wear.history import LIFE_SHARE, WearHistory, cycles_to_preload
@@ -17,6 +16,7 @@ from tribodyn.hbm.wear.step_control import Tolerance
 from tribodyn.hbm.wear.wear_loop import evolve
 from tribodyn.hbm.wear.wear_problem import WearProblem
 from tribodyn.refusal import Refusal
+from tribodyn.workflows.pictures.figures import log_axis, positive_range
 from tribodyn.workflows.pictures.theme import BLUE, GREY, ORANGE, STYLE
 from tribodyn.workflows.run import modelling, wear_run
 from tribodyn.workflows.run.progress import Progress
@@ -170,9 +170,7 @@ def picture(table: WearStepTable) -> Figure:
                     pane.annotate(f"{100 * row.step:g} %", at, (3, 4), textcoords="offset points", fontsize=7)
             pane.axhline(target, color=GREY, linestyle=":", linewidth=1)
             pane.set(title=f"{table.scene}: error in {name}", xlabel="harmonic balance solves")
-            pane.xaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
-            pane.xaxis.set_major_formatter(StrMethodFormatter("{x:g}"))
-            pane.xaxis.set_minor_formatter(NullFormatter())
+            log_axis(pane.xaxis, *positive_range(np.array([row.hbm_solves for row in table.rows])))
         panes[0].set_ylabel("relative error")
         panes[0].legend(title="wear rule, step or tolerance")
     return figure

@@ -9,15 +9,8 @@ from scipy import stats
 
 from tribodyn.hbm.quantity import StatedQuantity, names_with_error, quantities_of
 from tribodyn.refusal import Refusal
-from tribodyn.workflows.pictures.figures import axes_of
-from tribodyn.workflows.pictures.matplotlib_names import (
-    Figure,
-    FuncFormatter,
-    LogLocator,
-    MaxNLocator,
-    NullFormatter,
-    mpl,
-)
+from tribodyn.workflows.pictures.figures import axes_of, log_axis, positive_range
+from tribodyn.workflows.pictures.matplotlib_names import Figure, MaxNLocator, mpl
 from tribodyn.workflows.pictures.theme import BLUE, GREY, INK, ORANGE, RED, STYLE
 from tribodyn.workflows.studies.many.run_task import RUN
 
@@ -134,10 +127,7 @@ def picture_of_lives(distribution: LifeDistribution) -> Figure:
         ticks = [tick for tick in TICKS if lowest <= tick <= 1 - lowest]
         paper.set_yticks(stats.norm.ppf(ticks), [f"{100 * tick:g} %" for tick in ticks])
         if distribution.logarithmic:
-            paper.set_xscale("log")
-            paper.xaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
-            paper.xaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
-            paper.xaxis.set_minor_formatter(NullFormatter())
+            log_axis(paper.xaxis, *positive_range(distribution.values[shown]))
         paper.set(xlabel=_axis_label(distribution.number), ylabel="share of the parts below")
         paper.set_title(f"{distribution.name}: {distribution.runs} runs")
         paper.legend(loc="upper left", fontsize=9)
