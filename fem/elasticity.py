@@ -222,7 +222,7 @@ def element_materials(
 
 
 def densities(mesh: Any, material: AnyMaterial | Mapping[str, AnyMaterial]) -> np.ndarray:
-    """Density of each element of one mesh (n_element,) [kg/m3]; raises Refusal as `of_elements` does."""
+    """Density of each element of one mesh (n_element,) [kg/m3]; raises Refusal as `element_materials` does."""
     kinds, kind = element_materials(mesh, material)
     return np.array([material_kind.rho for material_kind in kinds])[kind]
 

@@ -71,7 +71,7 @@ def extract_volume(mesh: Any, node_sets: Mapping[str, np.ndarray], volume: str) 
 def overlap(first: Any, second: Any) -> tuple[float, np.ndarray] | None:
     """Share of the elements of one mesh whose middles lie in the other one, and the mean of their places (3,) [m].
 
-    one, other : skfem MeshHex2 or MeshTet2; None where less than SHARE of them do"""
+    first, second : skfem MeshHex2 or MeshTet2; None where less than SHARE of them do"""
     middles = _middles(first)
     picked = middles[np.unique(np.linspace(0, len(middles) - 1, MAX_SAMPLES).astype(int))]
     corners = second.doflocs[:, np.unique(second.t)]

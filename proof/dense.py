@@ -22,7 +22,6 @@ class Profile:
     contact: float = 0.0
     balance: float = 0.0
     inversion: float = 0.0
-    inversions: int = 0
 
 
 @dataclass(frozen=True)
@@ -99,7 +98,6 @@ class DenseBalance:
             clock = perf_counter()
             q -= np.linalg.solve(jacobian, residual)
             self.profile.inversion += perf_counter() - clock
-            self.profile.inversions += 1
         return DenseSolution(omega, q.reshape(-1, self.problem.basis.n_coeff), x, outcome, steps)
 
     def residual(self, linear: np.ndarray, q: np.ndarray) -> tuple[np.ndarray, ContactCycle, np.ndarray]:

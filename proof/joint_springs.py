@@ -29,7 +29,7 @@ class JointSprings:
     """The reduced part without springs, and what each spring adds per unit of its stiffness.
 
     springs : name in the scene -> (n, n) [-]; contact : (n_pair, n_component) stuck contact of the scene [N/m]
-    given : name -> stiffness in the scene [N/m]"""
+    declared : name -> stiffness in the scene [N/m]"""
 
     model: ReducedModel
     springs: Mapping[str, np.ndarray]

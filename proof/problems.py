@@ -73,7 +73,7 @@ def wear(file: SceneFile, balance: HarmonicBalance) -> WearHistory:
     if table is None:
         raise Refusal(f"{file.name} has no [wear]: say how it wears")
     at_rest = table.end_at == "at_rest"
-    problem = wear_run.wear_problem(file.scene, file.folder, balance, table.lost_below, at_rest)
+    problem = wear_run.wear_problem(file.scene, balance, table.lost_below, at_rest)
     scale = settings.depth_scale(file.scene, references.free_deflection(balance), problem.area)
     return evolve(wear_run.rule_of(file.scene, problem, scale), table.max_steps)
 

@@ -109,7 +109,7 @@ def compare(scene: str, say: Callable[[str], None], overrides: tuple[str, ...] =
 def _problem(file: scene_file.SceneFile) -> tuple[WearProblem, float]:
     with threadpool_limits(1):
         model = modelling.build(file, Progress())
-    problem = wear_run.wear_problem(file.scene, file.folder, model.balance, LIFE_SHARE)
+    problem = wear_run.wear_problem(file.scene, model.balance, LIFE_SHARE)
     return problem, delta_max(file.scene, free_deflection(model.balance), problem.area)
 
 

@@ -68,7 +68,7 @@ def family(
 def aeroelastic(wave: WaveModel, springs: np.ndarray, flow: Flow, n_modes: int = 20) -> dict[int, complex]:
     """Eigenvalue lambda [1/s] of the family's wave with the stuck wheel in the flow, for every index from -N/2 + 1.
 
-    wave : with its damping and Coriolis forces, without the flow; few : modes of each index that take part
+    wave : with its damping and Coriolis forces, without the flow; n_modes : modes of each index that take part
     The frequency is Im lambda > 0: the wave of index j runs with the rotation for j > 0. Re lambda > 0 is flutter"""
     n, flown = wave.n_sectors, with_flow(wave, springs, flow)
     eigenvalues = {}

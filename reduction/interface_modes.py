@@ -25,7 +25,7 @@ def interface_modes(
 
     model : from reduction.craig_bampton, masters first; n_modes : at most the number of masters that do not stay
     keep : DOFs of the full system, masters all of them, that stay physical (SCCe); none for SCC
-    apart : those of `keep` that must not move the contact by themselves, as a displacement that is to be prescribed
+    separate : those of `keep` that must not move the contact by themselves, as a displacement that is to be prescribed
         must not: the static shapes that belong to them are coordinates of their own, as far as the modes lack them
     Returns the model in coordinates: kept masters in ascending order, interface modes, static shapes, fixed-interface
         modes

@@ -83,7 +83,7 @@ class ResidualFlexibility:
     def recalled(self, force: np.ndarray, cache: Sequence[np.ndarray]) -> np.ndarray:
         """R times the part of forces f (n_contact, k) that it is known of.
 
-        asked : none, or one pair (2, n_contact, j): orthonormal k^-1/2 f of forces that R was asked for, and R f"""
+        cache : none, or one pair (2, n_contact, j): orthonormal k^-1/2 f of forces that R was asked for, and R f"""
         basis, displacement = cache[0] if cache else np.zeros((2, len(force), 0))
         product: np.ndarray = displacement @ (basis.T @ self.lacking(force))
         return product

@@ -34,9 +34,8 @@ def read(path: Path) -> RawMesh:
 class _Archive(ArchiveMesh):
     """A file that is read line by line.
 
-    i : the next line; types, options : of elements, by the number of their kind; constants : of materials by name
-    systems : local ones; of_solids : volume group -> its material and local system; node_axes : node -> its axes
-    equations : by number, and the number of the last; alike : set of CP -> its first node
+    constants : of materials by number; systems : local ones
+    equations : by name; equation : that of the last; first_coupled : set of CP -> its first node
     loads : on nodes, along axes that may be turned"""
 
     constants: dict[int, dict[str, float]] = field(default_factory=dict)

@@ -21,9 +21,9 @@ _NO_NAME = "Open CASCADE"  # how its writer calls what has no name
 class Sizes:
     """Element sizes, in the unit of the file. everywhere : None for a tenth of the shape's length
     bodies : name of a solid -> size; faces : number of a face -> size there
-    only : name of the one solid that is meshed, None for all
-    along : elements on the longest edge of the box where no size is asked for
-    around : elements around a full turn of a curved face, down to the least size over `finest`"""
+    solid : name of the one solid that is meshed, None for all
+    elements_per_edge : on the longest edge of the box where no size is asked for
+    elements_per_turn : around a full turn of a curved face, down to the least size over `finest`"""
 
     everywhere: float | None = None
     bodies: Mapping[str, float] = field(default_factory=dict)

@@ -66,8 +66,7 @@ def read(path: Path) -> RawMesh:
 class _Bulk(ReferenceCards):
     """Reads the cards of a file one after the other.
 
-    chosen : kind of set -> numbers that the case control selects, None where there is no case control
-    grids, systems, springs, scales : cards that others refer to, by their number; weight : PARAM WTMASS"""
+    weight : PARAM WTMASS"""
 
     sets: dict[int, list[int]] = field(default_factory=dict)
     properties: dict[int, tuple[int, int]] = field(default_factory=dict)

@@ -164,7 +164,7 @@ class ReferenceCards:
     """Cards by their number, before the others are read.
 
     chosen : kind of set -> numbers that the case control selects, None where there is no case control
-    systems : cards of coordinate systems; built : those that are built; scales : of load sets
+    grids, springs : cards; systems : of coordinate systems; built : those that are built; scales : of load sets
     unselected : a clause for each set that is not in force; defined : kind and number of each set
     common : fields of GRDSET"""
 

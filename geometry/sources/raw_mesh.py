@@ -69,11 +69,11 @@ Terms = list[tuple[int, int, float]]
 class LabelledMesh:
     """Labelled nodes and elements of a file while it is read, for formats whose groups are lists of labels.
 
-    met : its cards that are not read; points : label -> (3,); solids : kind -> its elements, label and nodes by label
-    volumes, node_sets : groups by label
+    skipped : its cards that are not read; points : label -> (3,); volumes, node_sets : groups by label
+    solids : kind -> its elements, label and nodes by label
     frames : label -> the directions along which displacements of that node count, x, y, z for others
     formulations : label of an 8-node element -> its formulation, others have incompatible modes
-    held : (axis, value) -> nodes that are held there; equations, springs : terms, and a stiffness"""
+    prescribed : (axis, value) -> nodes that are held there; equations, springs : terms, and a stiffness"""
 
     skipped: SkippedCards
     points: dict[int, list[float]] = field(default_factory=dict)

@@ -18,7 +18,7 @@ class Bordered(Protocol):
 
 
 class DenseBordered:
-    """With a full D (n, n); border, left : r, l (n,), l = r^H by default."""
+    """With a full D (n, n); border, row : r, l (n,), l = r^H by default."""
 
     def __init__(self, d: np.ndarray, border: np.ndarray, corner: float, row: np.ndarray | None = None):
         row = border.conj() if row is None else row

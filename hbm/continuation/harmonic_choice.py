@@ -174,7 +174,7 @@ def estimate(
 ) -> Estimate:
     """What the harmonics of a wide balance would change in a solution with some of them.
 
-    wide : from `widened`; kept : harmonics of the solution x (n_pair, n_component, n_coeff) [m] at omega [rad/s]
+    wide : from `widened`; kept_harmonics : those of the solution x (n_pair, n_component, n_coeff) [m] at omega [rad/s]
     split : whether the shares are wanted too, at the cost of one linear solve each"""
     narrow = wide.with_harmonics(kept_harmonics)
     response = narrow.basis.transfer(narrow.outputs(narrow.evaluate(omega, x, jacobian=False)), wide.basis)

@@ -141,7 +141,7 @@ def walk(
 ) -> tuple[list[_Solved], Outcome[BranchEnd]]:
     """Points from the logarithm of the amplitude `start` to `goal`, and how the walk ends.
 
-    below : decades under `start` from which it is walked to, one after another, where the reference mode is too far off
+    decades : under `start` from which it is walked to, one after another, where the reference mode is too far off
     """
     first = problem.first_guess(np.exp(start))
     fixed = np.zeros(len(first.coordinates))

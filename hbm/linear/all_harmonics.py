@@ -89,7 +89,7 @@ def modal(forces, n_e, ratio, has_static, real, imag, pivots, static):
 
 @numba.njit(cache=True)
 def displaced(products, higher, to_ports, n, n_e, unit, ratio, has_static, real, imag, pivots, static):
-    """Displacement (n, n_coeff) from forces times [W_0, modes] and the W_k, as rows; left : (m + n_e m, n_port)."""
+    """Displacement (n, n_coeff) from forces times [W_0, modes] and the W_k, as rows; to_ports : (m + n_e m, n_port)."""
     n_port = to_ports.shape[1]  # this copy and the typed 0 below make one kernel of `modal` serve both: a second each
     y = modal(products[:, n_port:].copy(), n_e, ratio, has_static, real, imag, pivots, static)
     return gathered(np.dot(y, to_ports), products, higher, n, n_port, unit, ratio, has_static)

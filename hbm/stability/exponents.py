@@ -148,7 +148,7 @@ def _of_wave(balance: HarmonicBalance, state: State, n_modes: int | None, top: i
     if modes is None or modes.m != n_modes_moving:
         modes = _WAVES[linear] = wave_exponents.WaveModes(balance.model, linear.k, n_modes_moving)
     slope, answer = _departure_slope(balance, state, basis), _answer(balance, state, basis)
-    values, diameters = wave_exponents.exponents(balance, modes, state.omega, slope, answer)
+    values, diameters = wave_exponents.exponents(modes, state.omega, slope, answer)
     exponents, order = _sorted(values, state.omega)
     return Stability(state.omega, exponents, diameters[order])
 

@@ -17,7 +17,6 @@ for one sector; the extension to all nodal diameters and the elimination of the 
 import numpy as np
 import scipy.linalg as sla
 
-from tribodyn.hbm.balance import HarmonicBalance
 from tribodyn.hbm.linear.stuck_modes import stuck_modes
 from tribodyn.hbm.stability.hill_problem import GROWS, Answer, StuckModes, index_exponents, of_exponentials, refined
 from tribodyn.reduction.model import ReducedModel
@@ -70,7 +69,7 @@ class WaveModes:
 
 
 def exponents(
-    balance: HarmonicBalance, modes: WaveModes, omega: float, slope: np.ndarray, answer: Answer | None = None
+    modes: WaveModes, omega: float, slope: np.ndarray, answer: Answer | None = None
 ) -> tuple[np.ndarray, np.ndarray]:
     """Floquet exponents of a travelling wave against perturbations of every nodal diameter.
 
@@ -104,7 +103,7 @@ def exponents(
 def _once(
     values: np.ndarray, centre: np.ndarray, diameters: np.ndarray, order: int, n_sectors: int, limit: int
 ) -> np.ndarray:
-    """The `wanted` exponents, in units of omega, with the most central perturbations, none of them twice.
+    """At most `limit` exponents, in units of omega, with the most central perturbations, none of them twice.
 
     (lambda - i s, d - s EO) with harmonics renumbered by s is the same perturbation as (lambda, d), for whole s"""
     chosen, count = np.empty(min(limit, len(values)), int), 0

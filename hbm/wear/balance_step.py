@@ -45,7 +45,7 @@ def balance_step(
 ) -> WearStep:
     """One accepted step from a state, with as many harmonics as a solution follows with.
 
-    whole : the problem with all harmonics, which rows have; each step tries more of them again"""
+    full_problem : with all harmonics, which rows have; each step tries more of them again"""
     problem, state = start_problem, start = harmonic_fallback.with_most_harmonics(full_problem, state)
     while isinstance(step := _implicit_step(problem, tolerance, state, rows, full_problem), NoSolution):
         start = replace(start, solves=step.solves)
@@ -121,7 +121,7 @@ class _ImplicitStep:
 def _implicit_step(
     problem: WearProblem, tolerance: Tolerance, state: WearState, rows: Sequence[WearRow], full_problem: WearProblem
 ) -> WearStep | NoSolution:
-    """A step with the harmonics of a problem, where a solution follows; whole : with all, which rows have."""
+    """A step with the harmonics of a problem, where a solution follows; full_problem : with all, which rows have."""
     if not state.rate.max() > 0:
         top = problem.balance.basis.harmonics[-1]
         return NoSolution(WearEnd.NO_STEP.say(f": no pair slips with harmonics 0 to {top}"), state.solves)

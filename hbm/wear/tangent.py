@@ -147,7 +147,7 @@ class Tangent:
     def along(
         self, row: WearRow, earlier: Sequence[WearRow], before: WearState, after: WearState, depth: np.ndarray
     ) -> np.ndarray:
-        """Derivatives of the depth (n_pair, n) behind a step from those before it; past : the rows before."""
+        """Derivatives of the depth (n_pair, n) behind a step from those before it; earlier : the rows before."""
         self._check_status(before, after)
         stride = row.cycles_in_step
         if self.scheme == StepScheme.EXPLICIT:

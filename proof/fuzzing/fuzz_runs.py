@@ -39,7 +39,7 @@ class FuzzEnd:
     """One case.
 
     end : success, refused or failed (with one sentence), else what is wrong with it
-    said : the sentence, or what was printed; seconds : of the processor
+    output : the sentence, or what was printed; seconds : of the processor
     silent : the longest time without a word of progress, of its processor seconds"""
 
     scene: str
@@ -71,7 +71,7 @@ class Job:
 class _Running:
     """What a process tries; place : its folder; worked : its processor seconds so far; since : when it last worked.
 
-    said : bytes that it has printed; at : its seconds then; silent : longest time between such"""
+    output : bytes that it has printed; at : its seconds then; silent : longest time between such"""
 
     job: Job
     place: Path

@@ -1,6 +1,6 @@
 """Random small problems for the property tests: models, contact laws, loads and harmonics over many powers of ten.
 
-`balance_problems` draws them for hypothesis; what a matrix holds comes from a drawn seed, what decides how hard a
+`drawn_problems` draws them for hypothesis; what a matrix holds comes from a drawn seed, what decides how hard a
 problem is (stiffness, friction, loads, damping, frequency, harmonics) is drawn one by one, so that hypothesis can find
 the extremes and shrink to them."""
 

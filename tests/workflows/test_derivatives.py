@@ -248,7 +248,7 @@ def test_derivatives_of_the_blades_life_are_those_of_its_steps_taken_again(site,
         return ParameterVariation(file.changed(f"{key}={0.5 * factor!r}"), Progress())
 
     def problem_of(factor):
-        return exactly(wear_run.wear_problem(file.scene, file.folder, varying(factor).model.balance, share), **site)
+        return exactly(wear_run.wear_problem(file.scene, varying(factor).model.balance, share), **site)
 
     with limited(1):
         base, problem = varying(), problem_of(1.0)

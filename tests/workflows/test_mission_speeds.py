@@ -34,7 +34,7 @@ def worn(scene: Path, *changes: str) -> WearHistory:
     file = scene_file.read(str(scene), (*SLIPPING, *changes))
     model = modelling.build(file, Progress())
     wear = file.scene.wear
-    problem = wear_run.wear_problem(file.scene, file.folder, model.balance)
+    problem = wear_run.wear_problem(file.scene, model.balance)
     return evolve(wear_run.rule_of(file.scene, problem, 2e-6), wear.max_steps)
 
 

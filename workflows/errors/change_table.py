@@ -180,7 +180,7 @@ class ChangeTable:
             self.estimate(Refinement.WEAR_STEPS, [name], relative, "estimate of the wear rule")
         if worn.in_time.any():  # scatter changes the cycles, not the depth of a contact that is worn through
             self.estimate(Refinement.MOTION, durations, worn.scatter, "standard error of means in time")
-            problem = wear_run.wear_problem(file.scene, file.folder, self.model.balance)
+            problem = wear_run.wear_problem(file.scene, self.model.balance)
             difference = abs(untaken_periodic_share(problem, worn, self.limits.searched_rows))
             text = "periodic motions that the irregular one did not take"
             self.estimate(Refinement.OTHER_MOTION, durations, difference, text)

@@ -116,7 +116,7 @@ def measure_ladders(
 ) -> LadderTables:
     """Measure ladders of a scene, all that it has where none is named.
 
-    overrides : of the scene, on top of the base of its study; most : settings of each ladder, the coarsest ones
+    overrides : of the scene, on top of the base of its study; n_settings : settings of each ladder, the coarsest ones
     Raises  Refusal for a ladder that the scene does not have"""
     plain = scene_file.read(scene, overrides)
     study = study_of(plain)

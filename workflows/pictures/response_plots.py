@@ -40,7 +40,7 @@ def response(result: Result) -> Figure:
         if result.response is not None:
             good = result.response.converged
             amplitude = scale * result.response.amplitude(result.response.output_names[0])
-            _curve(axes, result, good, amplitude, scale)
+            _curve(axes, result, good, amplitude)
         if result.wear is not None and result.wear_steps:
             wear = result.wear
             hertz = wear.omega / (2 * np.pi)
@@ -67,7 +67,7 @@ def response(result: Result) -> Figure:
     return figure
 
 
-def _curve(axes: Any, result: Result, good: np.ndarray, amplitude: np.ndarray, scale: float) -> None:
+def _curve(axes: Any, result: Result, good: np.ndarray, amplitude: np.ndarray) -> None:
     """The response curve: unstable stretches dashed, bifurcations marked."""
     marks, hertz = result.stability, present(result.response).frequency
     if marks is None:

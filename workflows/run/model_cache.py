@@ -125,7 +125,7 @@ def _reads_others(path: Path, changed: int) -> bool:
 
 
 def _cached(file: SceneFile, kind: str, ingredients: tuple[Any, ...], make: Callable[[], T]) -> T:
-    """own : what it is made of, its tables first."""
+    """ingredients : what it is made of, its tables first."""
     room, last = cache_folder(), _last.get()
     if last is not None and kind in last and last[kind][0] == ingredients:
         model: T = last[kind][1]

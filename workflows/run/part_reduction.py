@@ -100,7 +100,7 @@ def reduce(scene: MeshScene, part: Part) -> ReducedModel:
 def without_masters(scene: MeshScene, contact_dofs: int, has_constraints: bool) -> bool:
     """Whether the contact DOFs are no coordinates: as the scene asks, else where there are thousands of them.
 
-    held : whether motions are held besides the clamps
+    has_constraints : whether motions are held besides the clamps
     Raises  Refusal where the scene asks for it and has what needs them"""
     method = scene.reduction.method
     needs = {"[wheel]": scene.wheel, "[prescribed]": scene.prescribed, "no_turning": has_constraints}

@@ -250,10 +250,7 @@ def _contact(scene: MeshScene, mesh: Any, node_sets: dict[str, np.ndarray], free
             masters.append(body_1_dofs(interface).ravel())
         else:
             masters += [np.unique(half.indices) for half in (interface.B, *second)]
-    masters += [
-        find_group(node_sets, names_of_laws.group) * 3 + "xyz".index(names_of_laws.axis)
-        for names_of_laws in scene.prescribed.values()
-    ]
+    masters += [find_group(node_sets, table.group) * 3 + "xyz".index(table.axis) for table in scene.prescribed.values()]
     touched = [(find_group(node_sets, group)[:, None] * 3 + np.flatnonzero(axis)).ravel() for group, axis in points]
     masters += [dofs for dofs in touched if len(dofs) <= LIMITS.point_load]
     return pairs, len(np.intersect1d(np.concatenate([*masters, []]).astype(int), free))

@@ -1,7 +1,6 @@
 """The wear of a run: from the unworn problem until contact is lost, every step kept as soon as it is done."""
 
 from dataclasses import replace
-from pathlib import Path
 from time import process_time
 
 import numpy as np
@@ -55,7 +54,7 @@ def wear_down(file: SceneFile, model: Model, result: Result, keep: Keeper, advan
         note = f"step {len(rows)}, {state}, preload {row.preload:.4g} N, depth {deepest:.3g} mm"
         advance(done, note, (row.cycles + row.cycles_in_step, row.preload))
 
-    problem = wear_problem(scene, file.folder, model.balance, wear.lost_below, wear.end_at == "at_rest")
+    problem = wear_problem(scene, model.balance, wear.lost_below, wear.end_at == "at_rest")
     response = result.response
     if response is not None and (peak := response.peak(settings.OUTPUT)) is not None:
         problem = _start(problem, (float(response.omega[peak]), model.balance.shaped(response.contact[peak])))
@@ -87,15 +86,13 @@ def worn_out(
 
     start : peak that its duties there begin at, as `Duty.start` has it"""
     wear, balance = file.scene.wear_table, model.balance
-    problem = _start(wear_problem(file.scene, file.folder, balance, left, wear.end_at == "at_rest"), start)
+    problem = _start(wear_problem(file.scene, balance, left, wear.end_at == "at_rest"), start)
     scale = settings.depth_scale(file.scene, references.free_deflection(balance), problem.area)
     return evolve(rule_of(file.scene, problem, scale, with_growth=False), wear.max_steps)
 
 
-def wear_problem(
-    scene: Scene, folder: Path, balance: HarmonicBalance, lost_below: float = 0.0, at_rest: bool = False
-) -> WearProblem:
-    """What a scene wears, by its law and mission; folder : of the scene.
+def wear_problem(scene: Scene, balance: HarmonicBalance, lost_below: float = 0.0, at_rest: bool = False) -> WearProblem:
+    """What a scene wears, by its law and mission.
 
     lost_below : share of the first preload at which the run ends, of that at rest where `at_rest`"""
     table = scene.wear_table

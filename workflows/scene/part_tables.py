@@ -82,7 +82,8 @@ def part_parameters(
 ) -> dict[str, int | float]:
     """Parameters of a part in SI units: all of them, or those given to a file of one's own, which is not run here.
 
-    given : key -> number or text with a unit; folder : of the scene; kind : of the table, which has general keys too
+    values_given : key -> number or text with a unit; folder : of the scene
+    kind : of the table, which has general keys too
     Raises  ValueError: no such part, unknown key, or a value that the part refuses"""
     general = [name for name in kind.model_fields if name != "parameters"]
     if is_user_file(part):

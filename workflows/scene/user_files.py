@@ -42,7 +42,7 @@ def numbers(
 ) -> dict[str, int | float]:
     """The numbers of a law, a part or a continuation from a table of a scene, in SI units.
 
-    table : its key with a dot, such as "contact."; given : what the table has besides `others`, its general keys
+    table : its key with a dot, such as "contact."; values : what the table has besides its `general` keys
     Raises  Refusal: one is unknown, missing, not in its unit or out of its limits; lists those that there are"""
     by_name = {number.name: number for number in declared}
     result: dict[str, int | float] = {}

@@ -50,7 +50,7 @@ def of_life(
     varying: ParameterVariation, worn: WearHistory, changes: Iterator[ParameterChange], values: Mapping[str, float]
 ) -> Derivatives:
     scene, by_key = varying.scene, wear_run.law_numbers(varying.scene)
-    problem = wear_run.wear_problem(scene, varying.file.folder, varying.model.balance)
+    problem = wear_run.wear_problem(scene, varying.model.balance)
     numbers = {key: by_key[key][1:3] for key in values if key in by_key}
     return tangent.of_life(problem, worn, changes, numbers, life_share(scene))
 

@@ -102,7 +102,7 @@ def run_to_accuracy(
     accuracy : such as "1 %", "1 % of energy and peak frequency"
     folder : where result.h5 of the last run is kept, and those of all runs in rounds/1, rounds/2, ...
     resume : take the runs that the folder holds already
-    Returns the last result and its errors; `met` says whether all are below the bound
+    Returns the last result and its errors; `is_satisfied` says whether all are below the bound
     Raises  Refusal: the accuracy or the scene asks for what cannot be; SolveFailed: folder keeps what was computed"""
     file, report = read_scene(source, overrides), reporter(progress)
 

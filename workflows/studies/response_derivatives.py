@@ -201,8 +201,7 @@ def derivatives(
 def _of_scene(
     file: SceneFile, of: str, at: float | None, values: Mapping[str, float], without: dict[str, str] | None, report: Any
 ) -> ResponseDerivatives:
-    """Of a scene that was read; at : frequency [Hz]; wanted : key -> value; without :
-    see `changes_of`."""
+    """Of a scene that was read; at : frequency [Hz]; values : by key; without : see `changes_of`."""
     varying = ParameterVariation(file, report)
     balance, clock = varying.model.balance, process_time()
     find: Callable[[Iterator[ParameterChange]], Derivatives]

@@ -57,7 +57,7 @@ class InTime:
 
 @dataclass(frozen=True)
 class Stage:
-    """A stage of wear: row of the history; its cycle, and the same in time; response; loop as `rig_wear.loop`."""
+    """A stage of wear: row of the history; its cycle, and the same in time; response; loop as `wear.loop`."""
 
     row: int
     cycle: Cycle

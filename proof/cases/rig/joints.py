@@ -69,10 +69,10 @@ def match_kinds(
     dominant: float = 0.4,
     stranger: float = 10.0,
 ) -> np.ndarray:
-    """The mode (n_wanted,) that stands for each wanted one: of its kind, and nearest in frequency on the whole.
+    """The mode (n_target,) that stands for each target: of its kind, and nearest in frequency on the whole.
 
     frequency : (n,) of the modes; share : (n, n_kind) of each mode's motion that is of a kind
-    wanted : kind and frequency of each; dominant : share from which on a mode counts as one of a kind
+    targets : kind and frequency of each; dominant : share from which on a mode counts as one of a kind
     stranger : cost of a mode of another kind, beside squared logarithms of ratios of frequencies
     Returns indices into frequency, no two the same; where there are too few modes of a kind, one of another kind stands
     Raises  ValueError where there are fewer modes than wanted ones"""

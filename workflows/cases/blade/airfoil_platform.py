@@ -102,7 +102,7 @@ def platform(section: Section, heights: tuple[float, float], left_edge: np.ndarr
     """Platform around a section from its left and right edge.
 
     heights : z of the section at bottom and top [m]
-    left, right : (2, 4, 3) points of the edges at bottom and top, from front to rear [m]"""
+    left_edge, right_edge : (2, 4, 3) points of the edges at bottom and top, from front to rear [m]"""
     corners = np.empty((2, 4, 4, 3))
     corners[:, :, 0], corners[:, :, 3] = left_edge, right_edge
     u, v = np.array([0.0, 1.0])[:, None], np.array([0.0, 1.0])[None, :]

@@ -32,7 +32,7 @@ Side = tuple[str, float, "SceneAnswers", "SceneAnswers"]
 class SceneAnswers:
     """What one scene says; cycles and wear runs that several numbers share are solved once.
 
-    near : a scene that differs little, from whose cycles those of this one are found"""
+    neighbour : of a scene that differs little, from whose cycles those of this one are found"""
 
     def __init__(self, file: SceneFile, model: modelling.Model, neighbour: SceneAnswers | None = None):
         self.file, self.model, self._near_points = file, model, {} if neighbour is None else neighbour._points

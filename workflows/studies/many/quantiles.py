@@ -88,8 +88,8 @@ def counted(
     the others put there. The ends are the next values to either side whose corrected share is not as wanted, by the
     scatter of that count.
 
-    values, said : (n, m) runs drawn from the distribution, and what the others say of each, m equally likely ones of
-        each where a factor of them is known exactly; none were added on purpose
+    values, predictions : (n, m) runs drawn from the distribution, and what the others say of each, m equally likely
+        ones of each where a factor of them is known exactly; none were added on purpose
     Source  Angelopoulos et al. 2023, doi 10.1126/science.adi6000: prediction-powered quantiles"""
     thinned = sample.mean[:: max(len(sample.mean) // GRID, 1)]
     at = np.unique(np.concatenate([thinned, values.ravel(), predictions.ravel()]))
@@ -135,7 +135,7 @@ class Influence:
     """What one key does to a number.
 
     first : share of the variance that goes when the key is known exactly; total : that stays when all others are known
-    left : standard deviation over what it is now, if the key were known exactly, sqrt(1 - first)"""
+    remaining : standard deviation over what it is now, if the key were known exactly, sqrt(1 - first)"""
 
     key: str
     first: float
