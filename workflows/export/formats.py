@@ -10,6 +10,7 @@ from tribodyn.fem.system import dense
 from tribodyn.reduction.model import ReducedModel
 from tribodyn.refusal import Refusal
 from tribodyn.workflows.export import result_tables, vtk
+from tribodyn.workflows.result.provenance import rebuilt
 from tribodyn.workflows.result.result import Result
 from tribodyn.workflows.run import modelling
 from tribodyn.workflows.run.progress import Progress
@@ -19,8 +20,6 @@ def reduced_model(result: Result) -> ReducedModel:
     """The reduced model that a result was computed with, made again from its scene.
 
     Raises  ValueError where its parts are not there any more"""
-    from tribodyn.workflows.result.provenance import rebuilt
-
     return modelling.build(rebuilt(result), Progress(), result.harmonics).reduced
 
 
@@ -63,15 +62,12 @@ def write_matlab(result: Result, folder: Path) -> list[Path]:
     return [path]
 
 
-FORMATS: dict[str, tuple[str, Callable[[Result, Path], list[Path]]]] = {
+FORMATS: dict[str, tuple[str, Callable[..., list[Path]]]] = {
     "vtk": ("series for ParaView over wear and over a cycle (.pvd, .vtu, .vtp)", vtk.write_vtk),
     "csv": ("every curve and history as a table", result_tables.write_csv),
     "mat": ("the same tables as structs for MATLAB", result_tables.write_mat),
     "uff": ("universal file, dataset 58, for tools of measured data", result_tables.write_uff),
-    "mesh": (
-        "worn part with its fields (.xdmf; another format with --mesh-ending)",
-        lambda r, f: vtk.write_mesh(r, f / "part.xdmf"),
-    ),
+    "mesh": ("worn part with its fields (.xdmf; another format with --mesh-ending)", vtk.write_mesh),
     "npz": ("reduced matrices for NumPy, and for a scene's [model]", write_npz),
     "matlab": ("reduced matrices for MATLAB, and for a scene's [model]", write_matlab),
 }
@@ -88,8 +84,5 @@ def write(result: Result, names: Sequence[str], folder: Path, mesh_ending: str =
     for name in dict.fromkeys(names):
         place = folder / name
         place.mkdir(parents=True, exist_ok=True)
-        if name == "mesh":
-            written += vtk.write_mesh(result, place / f"part{mesh_ending}")
-        else:
-            written += FORMATS[name][1](result, place)
+        written += FORMATS[name][1](result, place, **({"ending": mesh_ending} if name == "mesh" else {}))
     return written

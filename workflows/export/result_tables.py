@@ -72,14 +72,10 @@ def write_uff(result: Result, folder: Path) -> list[Path]:
     path = folder / "result.uff"
     path.unlink(missing_ok=True)
     file = pyuff.UFF(str(path))
-    for entry in (_units(), *_spectra(result)):
+    units = {"type": 164, "units_code": 1, "units_description": "SI", "length": 1.0, "force": 1.0, "temp": 1.0}
+    for entry in (units | {"temp_offset": 0.0}, *_spectra(result)):
         file.write_sets(entry, "add")
     return [path]
-
-
-def _units() -> dict[str, Any]:
-    factors = {"length": 1.0, "force": 1.0, "temp": 1.0, "temp_offset": 0.0}
-    return {"type": 164, "units_code": 1, "units_description": "SI", "temp_mode": 1, **factors}
 
 
 def _spectra(result: Result) -> list[dict[str, Any]]:
@@ -110,15 +106,10 @@ def function(
 ) -> dict[str, Any]:  # fmt: skip
     """A dataset 58 in double precision with its own abscissa values."""
     return {
-        "type": 58, "binary": 0, "func_type": kind, "id1": text, "id2": "tribodyn", "id3": "", "id4": "", "id5": "",
-        "rsp_node": node, "rsp_dir": 0, "ref_node": 0, "ref_dir": 0, "rsp_ent_name": "NONE", "ref_ent_name": "NONE",
-        "ver_num": 1, "load_case_id": 0, "x": x, "data": y,
-        "ord_data_type": 6 if np.iscomplexobj(y) else 4, "abscissa_spacing": 0,
-        "num_pts": len(x), "abscissa_min": 0.0, "abscissa_inc": 0.0, "z_axis_value": 0.0,
+        "type": 58, "func_type": kind, "id1": text, "id2": "tribodyn", "ver_num": 1, "x": x, "data": y,
+        "rsp_node": node, "rsp_dir": 0, "ref_node": 0, "ref_dir": 0, "orddenom_spec_data_type": 0,
         "abscissa_spec_data_type": x_kind, "abscissa_axis_lab": x_name, "abscissa_axis_units_lab": x_unit or "NONE",
         "ordinate_spec_data_type": y_kind, "ordinate_axis_lab": text[:20], "ordinate_axis_units_lab": y_unit,
-        "orddenom_spec_data_type": 0, "orddenom_axis_lab": "NONE", "orddenom_axis_units_lab": "NONE",
-        "z_axis_spec_data_type": 0, "z_axis_axis_lab": "NONE", "z_axis_axis_units_lab": "NONE",
     }  # fmt: skip
 
 

@@ -33,12 +33,11 @@ VOIGT = [COMPONENTS.index(name) for name in ("xx", "yy", "zz", "xy", "yz", "xz")
 FULL = np.array([[0, 3, 5], [3, 1, 4], [5, 4, 2]])  # of components in that order, a tensor
 
 
-def write_mesh(result: Result, path: Path) -> list[Path]:
-    """The part as worn in the last state that is shown, in the format that the ending of a file names.
+def write_mesh(result: Result, folder: Path, ending: str = ".xdmf") -> list[Path]:
+    """The part as worn in the last state that is shown, in the format that the ending of its file names.
 
     Raises  ValueError where the result has no mesh or the format cannot hold it"""
-    meshio = package("meshio")
-
+    meshio, path = package("meshio"), folder / f"part{ending}"
     if result.part is None:
         raise Refusal("mesh: this result keeps no mesh; run a scene with a part and pictures.renders = true")
     if path.suffix not in (*WITH_FIELDS, *MESH_ONLY):

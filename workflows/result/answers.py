@@ -5,7 +5,7 @@ Summary, JSON, text, report, exports and the tables of studies are loops over th
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from math import isclose
 from typing import TYPE_CHECKING
 
@@ -43,7 +43,6 @@ class Answer:
 
     joint : named contact or place that it is of, empty for the whole; moment : FIRST, LAST, PEAK, STABLE or RUN
     value : None where there is none; error : what the verdict says of it, None without
-    derivative : key of the scene -> d value / d key, where these were computed
     reason : what a reader should know, such as where a life ends, or why this is no peak; empty for nothing"""
 
     quantity: StatedQuantity
@@ -51,7 +50,6 @@ class Answer:
     moment: str
     value: float | None
     error: Statement | None = None
-    derivative: Mapping[str, float] = field(default_factory=dict)
     reason: str = ""
 
     @property
