@@ -59,7 +59,7 @@ LIMITS = {
 GRANTS: dict[str, dict[int, int]] = {"lines": {57: 1_200, 58: 1_500, 59: 900}}
 # limits that are not met yet -> what there is; it only falls, and goes when the limit is met
 MISSED = {
-    "lines": 62_242,
+    "lines": 62_107,
 }
 
 
