@@ -5,10 +5,11 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from tests.helpers.contact_draws import HARMONICS, draw
+from tests.helpers.contact_draws import HARMONICS
 from tests.helpers.jenkins import describing_function
 from tribodyn.hbm.contact import aft, contact_law, planar_cycle
 from tribodyn.hbm.contact.contact_law import SEPARATES, SLIPS, STICKS, ContactParameters
+from tribodyn.hbm.contact.law_check import draw
 from tribodyn.hbm.harmonics import HarmonicBasis
 
 

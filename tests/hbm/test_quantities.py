@@ -14,7 +14,7 @@ from tribodyn.hbm.newton import NewtonOptions
 from tribodyn.hbm.quantity import CycleQuantity, Slopes, SolvedCycle, StatedQuantity
 from tribodyn.refusal import Refusal
 
-UNITS = {"Hz", "m", "rad", "J", "N", "m3", "Pa", "cycles", ""}
+UNITS = {"Hz", "m", "rad", "J", "N", "m3", "Pa", "Pa N/m", "cycles", ""}
 
 
 @pytest.fixture(scope="module")

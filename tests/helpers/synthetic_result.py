@@ -84,6 +84,7 @@ def result(n_row: int = 9, nx: int = 8) -> Result:
         work=cycles_in_step[:, None] * energy, duty_omega=omega_row[:, None], duty_response=row_response[:, None],
         duty_displacement=displacement[:, None], end=WearEnd.LOST.say(), spread=0.3 * t, mean_error=0.01 * t,
         is_stationary=np.ones(n_row, bool), periods=(t > 0.5) * 64, moving=np.outer(t, np.arange(5.0)),
+        bed=np.zeros_like(depth),
     )  # fmt: skip
     rows = np.array([0, n_row // 2, n_row - 1])
     shape = (part.points[:, 0] / LENGTH) ** 2
