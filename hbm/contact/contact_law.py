@@ -235,12 +235,11 @@ def complete(name: str, parameters: ContactParameters) -> ContactParameters:
     n = parameters.n_pair
     numbers = {key: np.array(np.broadcast_to(np.asarray(v, float), (n,))) for key, v in values.items()}
     result, law = replace(parameters, numbers=numbers), load(name)
-    aging = [] if parameters.aging is None else [*parameters.aging.tables]
     if hasattr(law, "tabulate"):  # from its numbers, once
         limits = [number.name for number in declared(name) if number.role in declarations.SLIP_LIMITS]
-        if of_others := [number for number in aging if number not in limits]:
-            raise Refusal(f"contact law '{Path(name).stem}': {of_others[0]} cannot change with wear: give one number")
-    if hasattr(law, "tabulate"):
+        tables = () if parameters.aging is None else parameters.aging.tables
+        if fixed := [number for number in tables if number not in limits]:
+            raise Refusal(f"contact law '{Path(name).stem}': {fixed[0]} cannot change with wear: give one number")
         return replace(result, tabulation=law.tabulate(result))
     if parameters.table is not None:
         raise Refusal(f"contact law '{Path(name).stem}' takes no table: leave it out")

@@ -4,19 +4,21 @@ Of large models the largest multiplier alone, by Arnoldi's method on differences
 Source  Newton-Krylov shooting and its multipliers: Sanchez, Net, Garcia-Archilla and Simo 2004"""
 
 from collections.abc import Callable
+from contextlib import suppress
 from dataclasses import dataclass, replace
 
 import numpy as np
+from scipy.linalg import eigvalsh, norm
 
 from tribodyn.hbm.balance import HarmonicBalance, State
 from tribodyn.hbm.contact.contact_law import STICKS
-from tribodyn.hbm.stability.exponents import remembers, stability
+from tribodyn.hbm.stability.exponents import CLEAR, remembers, stability
 from tribodyn.hbm.time import period_search
 from tribodyn.hbm.time.period_search import Period, PeriodSearch, perturb
 from tribodyn.hbm.time.stepper import Options, TimeStepper
 from tribodyn.hbm.time.time_integration import integrate
 from tribodyn.hbm.time.verify import Verification
-from tribodyn.refusal import SolverFailure
+from tribodyn.refusal import Refusal, SolverFailure
 
 MULTIPLIERS = "its Floquet multipliers in time"
 HILL = "Hill's method"
@@ -88,6 +90,19 @@ def grows_in_time(balance: HarmonicBalance, state: State, options: Options | Non
         return largest_multiplier(balance, state, options) > 1 + RULES.growth
     except NoMultipliers:
         return None
+
+
+def growth_by_negative_damping(balance: HarmonicBalance, state: State, rounding: float = 1e-9) -> float | None:
+    """Rate [1/s] at which a perturbation of a solved state grows that a negative damping feeds; None where none does.
+
+    It may take longer to show in time than an integration lasts; rounding : of all damping, that counts as none"""
+    damping = balance.model.at_harmonic(1)[0].damping
+    if damping is None or eigvalsh(damping + damping.conj().T)[0] >= -rounding * norm(damping):
+        return None
+    with suppress(Refusal):
+        growth = float(stability(balance, state).exponents[0].real)
+        return growth if growth > CLEAR * state.omega or (growth > 0 and grows_in_time(balance, state)) else None
+    return None
 
 
 def is_stable(

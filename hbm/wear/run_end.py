@@ -38,7 +38,7 @@ def reason_to_stop(
     lost = lost_joint(problem, state, rows) if problem.any_joint else None
     if lost is not None:
         return WearEnd.PRELOAD_LOST.say(f" {problem.lost_below:.3g} of its first value in joint {lost}")
-    survival = f", the contact survives with {state.depth.max():.4g} m worn at most and {preload:.4g} N of preload left"
+    survival = f", the contact survives, {1e6 * state.depth.max():.4g} um worn at most, {preload:.4g} N of preload left"
     if state.rate.max() <= 0.0:
         if state.work.max() > 0.0:
             return WearEnd.NO_LOSS.say()

@@ -194,6 +194,8 @@ def test_growth_that_friction_limits_is_that_of_the_motion_in_time(ratio, force,
     result, reference = (way(balance, state) for way in (stability, stability_in_time))
     assert result.stable == reference.stable == stable
     assert np.abs(multipliers(result)).max() == pytest.approx(np.abs(multipliers(reference)).max(), rel=0.02)
+    growth = floquet.growth_by_negative_damping(balance, state)
+    assert growth is None if stable else growth == pytest.approx(reference.exponents[0].real, rel=0.05)
     monkeypatch.setattr(exponents, "_answer", lambda *of: None)
     assert not exponents.stability(balance, state).stable
 

@@ -10,8 +10,6 @@ from dataclasses import replace
 from math import log
 from time import process_time
 
-from scipy.linalg import eigvalsh, norm
-
 from tribodyn.hbm.continuation.operating_point import AtFrequency
 from tribodyn.hbm.fatigue import largest_von_mises
 from tribodyn.hbm.quantity import (
@@ -25,12 +23,10 @@ from tribodyn.hbm.quantity import (
     quantities_of,
     with_error,
 )
-from tribodyn.hbm.stability.exponents import CLEAR, stability
-from tribodyn.hbm.stability.floquet import grows_in_time
+from tribodyn.hbm.stability import floquet
 from tribodyn.refusal import Refusal, SolverFailure
 from tribodyn.workflows.errors import time_comparison
 from tribodyn.workflows.errors.change_table import ChangeTable, measure_changes
-from tribodyn.workflows.errors.ladders import ROUNDING
 from tribodyn.workflows.errors.operating_states import OperatingState, place_of_peak, relative_change
 from tribodyn.workflows.errors.refinement_limits import DEFAULT, RefinementLimits
 from tribodyn.workflows.errors.time_comparison import MotionDifference
@@ -58,8 +54,10 @@ def judge(
     comparison: MotionDifference | str | None = None
     with progress.stage("time integration"):
         if table.first is not None and not table.in_time:
-            comparison = _growth(table.first)
-            if comparison is None and time_comparison.is_checked(table.first, file.scene.verdict.in_time, limits):
+            growth = floquet.growth_by_negative_damping(table.first.balance, table.first.point.state)
+            if growth is not None:
+                comparison = f"negative damping feeds a vibration that grows by {growth:.2g} 1/s"
+            elif time_comparison.is_checked(table.first, file.scene.verdict.in_time, limits):
                 comparison = _compare(table, table.first)
             if comparison is not None and result.wear_steps and file.scene.wear is not None:
                 table.rows += time_comparison.changes_along_wear(file, model.balance, result, table.wear_harmonics)
@@ -69,17 +67,6 @@ def judge(
     quantities = (*cycle_quantities, *of_wear_with_error(worn_contact(result)), *of_curve)
     statements = {quantity.name: _statement(quantity, table, comparison) for quantity in quantities}
     return Verdict(statements, tuple(table.rows), table.ratio, process_time() - clock, table.worn_ratio)
-
-
-def _growth(state: OperatingState) -> str | None:
-    """Why a steady state that a negative damping feeds is left, which takes long in time; else None."""
-    damping = state.balance.model.at_harmonic(1)[0].damping
-    if damping is not None and eigvalsh(damping + damping.conj().T)[0] < -ROUNDING * norm(damping):
-        with suppress(Refusal):
-            solved, growth = state.point.state, stability(state.balance, state.point.state).exponents[0].real
-            if growth > CLEAR * solved.omega or (growth > 0 and grows_in_time(state.balance, solved)):
-                return f"negative damping feeds a vibration that grows by {growth:.2g} 1/s"
-    return None
 
 
 def _compare(table: ChangeTable, state: OperatingState) -> MotionDifference | str | None:

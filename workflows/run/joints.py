@@ -84,8 +84,7 @@ def elastic(scene: Scene, face: str) -> tuple[float, float]:
 
 def wear_table_of(scene: Scene, name: str = "") -> JointWearTable:
     """How a joint of a scene that wears does so: its own table, or that of all."""
-    own = getattr(scene.joints.get(name), "wear", None)
-    return scene.wear_table if own is None else own
+    return getattr(scene.joints.get(name), "wear", None) or scene.wear_table
 
 
 def wear_of(scene: Scene, name: str = "") -> JointWear:
@@ -96,8 +95,8 @@ def wear_of(scene: Scene, name: str = "") -> JointWear:
 
 def _over_wear(table: LawTable) -> dict[str, NumberTable]:
     """The tables over the state of worn pairs."""
-    states = {name: state for name, state in table.by_state.items() if state.over != "temperature"}
-    return {name: NumberTable(state.over, state.at, state.values) for name, state in states.items()}
+    states = table.by_state.items()
+    return {name: NumberTable(s.over, s.at, s.values) for name, s in states if s.over != "temperature"}
 
 
 def aging_of(scene: Scene, name: str) -> Aging | None:
