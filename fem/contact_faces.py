@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-from scipy.sparse import csr_matrix, eye_array, kron
+from scipy.sparse import csr_matrix
 
 from tribodyn.fem.constraints import find_group
 from tribodyn.fem.interface import COMPONENTS, ContactInterface, checked_components, contact_frames, unit
@@ -27,7 +27,6 @@ class ContactFaces:
     gap : opening before loading [m], one or (n_pair,); None takes the geometric gap between two faces, interference
         negative, and 0 to the ground
     vertices_only : no pairs at mid-side and mid-face nodes; without, six-node faces have theirs at mid-side nodes only
-    face_centres : one pair at the centre of each polygon between nodes, moved and opened by the mean of its corners
     plane : (3,) direction in which every pair closes, across a plane ground that touches the nearest of them
     inclination : of the plane about t1, by the right hand [rad], so small that it does not change the direction. The
         gap of a pair is its distance from the plane along that direction: what the face is bowed, what the plane leans
@@ -44,7 +43,6 @@ class ContactFaces:
     components: Sequence[str] = COMPONENTS
     gap: float | np.ndarray | None = None
     vertices_only: bool = False
-    face_centres: bool = False
     plane: Sequence[float] | None = None
     inclination: float = 0.0
     pairing: str = "auto"
@@ -67,8 +65,6 @@ class ContactFaces:
 
         Where the second face is a neighbour's B is the half of the first alone
         Raises  Refusal for an unknown or empty face, a t1 along the normal, a gap of the wrong length"""
-        if self.face_centres:
-            return self._at_centres(replace(self, face_centres=False).build(mesh))
         if self.opposite is not None:
             interface, B_2 = self.halves(mesh)
             return interface if self.turn is not None else replace(interface, B=interface.B - B_2)
@@ -81,20 +77,6 @@ class ContactFaces:
             height = np.tan(self.inclination) * (face.points @ tangent) - face.points @ normal
             gap = gap + height - height.min()
         return self._interface(mesh, face, gap)
-
-    def _at_centres(self, nodes: ContactInterface) -> ContactInterface:
-        """One pair for each polygon: one-point integration, as zero-thickness elements have it."""
-        n_face, k = nodes.faces.shape
-        corner, centres = nodes.points[nodes.faces], nodes.points[nodes.faces].mean(axis=1)
-        area = np.linalg.norm(np.cross(corner[:, 2] - corner[:, 0], corner[:, -1] - corner[:, 1]), axis=1) / 2
-        if self.turn is not None or abs(area.sum() / nodes.area.sum() - 1) > 0.01:  # of a curved face
-            needs = "nodes at the corners of the faces of elements (vertices_only), and both faces in one sector"
-            raise Refusal(f"contact '{self.face}': face_centres needs {needs}")
-        across = nodes.frames[nodes.faces, 2].mean(axis=1)
-        frames = contact_frames(across / np.linalg.norm(across, axis=1, keepdims=True), self.t1)
-        mean = csr_matrix((np.full(n_face * k, 1 / k), nodes.faces.ravel(), k * np.arange(n_face + 1)))
-        B, none = kron(mean, eye_array(len(nodes.components)), "csr") @ nodes.B, np.zeros((0, k), int)
-        return ContactInterface(nodes.components, centres, frames, area, mean @ nodes.gap, B, none, nodes, mean)
 
     def halves(self, mesh: Any) -> tuple[ContactInterface, csr_matrix]:
         """Both halves of a contact of two faces, over all DOFs of the mesh.

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from scipy.sparse import block_diag, eye_array, issparse, vstack
+from scipy.sparse import issparse, vstack
 
 from tribodyn.refusal import Refusal
 
@@ -24,9 +24,7 @@ class ContactInterface:
     area : (n_pair,) tributary area [m2], sums to the area of the patch
     gap : (n_pair,) opening before loading [m], negative is interference
     B : (n_pair * n_component, n_dof) row pair * n_component + component, sparse (full model) or dense (reduced)
-    faces : (n_face, k) corner-ordered polygons over the pairs, for area and pictures (may be empty)
-    nodes, mean : node pairs, and the (n_pair, n_node_pair) weights by which their means are these pairs; None where
-        these are node pairs themselves"""
+    faces : (n_face, k) corner-ordered polygons over the pairs, for area and pictures (may be empty)"""
 
     components: tuple[str, ...]
     points: np.ndarray
@@ -35,8 +33,6 @@ class ContactInterface:
     gap: np.ndarray
     B: Any
     faces: np.ndarray
-    nodes: ContactInterface | None = None
-    mean: Any = None
 
     @property
     def n_pair(self) -> int:
@@ -98,10 +94,6 @@ def join(interfaces: Sequence[ContactInterface]) -> ContactInterface:
     first = np.cumsum([0] + [i.n_pair for i in interfaces])
     names = ("points", "frames", "area", "gap")
     fields: dict[str, Any] = {name: np.concatenate([getattr(i, name) for i in interfaces]) for name in names}
-    if any(i.nodes is not None for i in interfaces):
-        fields["nodes"] = join([i.nodes or i for i in interfaces])
-        means = [eye_array(i.n_pair) if i.mean is None else i.mean for i in interfaces]
-        fields["mean"] = block_diag(means, format="csr")
     width, maps = max(i.faces.shape[1] for i in interfaces), [i.B for i in interfaces]
     faces = [np.pad(i.faces, ((0, 0), (0, width - i.faces.shape[1])), mode="edge") for i in interfaces]
     return ContactInterface(

@@ -133,8 +133,7 @@ def build(
         },
     )
     held_rows = np.array([part.force(row) for row in rows]).reshape(len(held_motions), len(free))
-    nodes = interface.nodes and replace(interface.nodes, B=part.rows(interface.nodes.B))
-    interface = replace(interface, B=part.rows(interface.B), nodes=nodes)
+    interface = replace(interface, B=part.rows(interface.B))
     return replace(part, system=system, interface=interface, held_rows=held_rows)
 
 

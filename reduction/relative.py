@@ -8,7 +8,7 @@ Source  the relative displacement of a shroud in Tamatam 2021, section 3.2.2, fo
 from dataclasses import replace
 
 import numpy as np
-from scipy.sparse import bsr_array, csr_matrix, eye_array, kron
+from scipy.sparse import bsr_array, csr_matrix, eye_array
 
 from tribodyn.fem.interface import COMPONENTS, ContactInterface
 from tribodyn.fem.system import SecondOrderSystem
@@ -24,7 +24,6 @@ def relative(
     Returns the system and interface in the new coordinates, and T (n, n) with q = T q_new; feed the reduced basis
         through T to get back to the full field
     Raises  Refusal where a component is missing, or where a body-1 DOF is held or shared by two pairs"""
-    averaged, interface = interface, interface.nodes or interface
     n, n_pair = system.n_dof, interface.n_pair
     B = csr_matrix(interface.B)
     body_1, retained = body_1_dofs(interface).ravel(), np.ones(n, dtype=bool)
@@ -37,8 +36,7 @@ def relative(
     place = csr_matrix((np.ones(len(body_1)), (np.arange(len(body_1)), body_1)), shape=(3 * n_pair, n))
     keep = csr_matrix(eye_array(n).tocsr().multiply(retained[:, None]))
     T = csr_matrix(keep + back @ place - back @ (B.multiply(retained[None, :])))
-    place = place if averaged.nodes is None else csr_matrix(kron(averaged.mean, eye_array(3)) @ place)
-    return system.projected(T), replace(averaged, B=place, nodes=None, mean=None), T
+    return system.projected(T), replace(interface, B=place), T
 
 
 def body_1_dofs(interface: ContactInterface) -> np.ndarray:
@@ -47,7 +45,6 @@ def body_1_dofs(interface: ContactInterface) -> np.ndarray:
     Raises  Refusal where one is not among the DOFs of the system, or the contact has not all three components"""
     if interface.components != COMPONENTS:
         raise Refusal(f"relative coordinates need contact components t1, t2, n, not {list(interface.components)}")
-    interface = interface.nodes or interface
     pairs, rows = np.arange(interface.n_pair + 1), np.arange(3 * interface.n_pair)
     back = bsr_array((interface.frames.transpose(0, 2, 1), pairs[:-1], pairs), shape=(len(rows), len(rows)))
     turned = csr_matrix(back @ csr_matrix(interface.B))  # x, from the frame of each pair back to the axes

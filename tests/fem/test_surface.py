@@ -174,26 +174,6 @@ def test_a_face_of_tetrahedra_has_its_pairs_at_its_sides():
     assert len(np.unique(np.sort(contact.faces, axis=1), axis=0)) == len(contact.faces)
 
 
-def test_pairs_at_face_centres_are_means_of_their_corners():
-    """Of a motion and a gap that are linear in place: their values there; joined with another contact, too."""
-    mesh = two_blocks()
-    nodes = ContactFaces("upper", (1, 0, 0), "lower").build(mesh)
-    centres = ContactFaces("upper", (1, 0, 0), "lower", face_centres=True).build(mesh)
-    assert (nodes.n_pair, centres.n_pair) == (25, 16)
-    assert centres.area == pytest.approx(np.full(16, 1 / 16))
-    slope = np.array([[1e-3, 2e-3, 0.0], [0.0, -1e-3, 3e-3], [4e-3, 1e-3, 2e-3]])
-    shifted = mesh.doflocs.T @ slope.T
-    shifted[mesh.doflocs[2] < 1 - 1e-9] = 0.0  # the upper body alone, whose face is at z = 1
-    shifted[np.unique(facet_nodes(mesh, mesh.boundaries["lower"]))] = 0.0
-    expected = np.einsum("pij,pj->pi", centres.frames, centres.points @ slope.T)
-    np.testing.assert_allclose((centres.B @ shifted.ravel()).reshape(-1, 3), expected, atol=1e-15)
-    assert centres.frames[:, 2] == pytest.approx(np.tile([0, 0, -1.0], (16, 1)))
-    text = join([nodes, centres])
-    np.testing.assert_allclose(text.mean @ text.nodes.points, text.points, atol=1e-15)
-    with pytest.raises(ValueError, match="face_centres needs nodes at the corners"):
-        ContactFaces("bottom", (1, 0, 0), face_centres=True).build(block(tets=True))
-
-
 @pytest.mark.parametrize(("face", "t1", "changes", "message"), [
     ("none", (1, 0, 0), {}, "empty"),
     ("inner", (1, 0, 0), {}, "inside the body"),

@@ -25,7 +25,7 @@ def part(tmp_path_factory):
     return built(tmp_path_factory.mktemp("relative") / "blocks.msh")
 
 
-def built(path, **contact):
+def built(path):
     """Two steel blocks one above the other, on springs; 5 x 5 node pairs in an inclined frame."""
     line, up, tall = np.linspace(0.0, 0.02, 3), np.linspace(0.0, 0.03, 3), np.linspace(0.03, 0.075, 4)
 
@@ -44,7 +44,7 @@ def built(path, **contact):
     mesh, sets = mesh_file.read(path)
     springs = [Spring(name, axis, 3e7) for name in ("lid", "base") for axis in np.eye(3)]
     return fem_part.build(
-        mesh, sets, Material(200e9, 0.3, 7900.0), [], [ContactFaces("bottom", (1.0, 0.3, 0.0), "top", **contact)],
+        mesh, sets, Material(200e9, 0.3, 7900.0), [], [ContactFaces("bottom", (1.0, 0.3, 0.0), "top")],
         {"push": NodalForce("point", (1, 0, 0))}, {"tip": NodalForce("point", (0, 0, 1))}, springs=springs,
     )  # fmt: skip
 
@@ -74,19 +74,6 @@ def test_reduced_model_needs_half_the_masters(part):
         exact = linear_modes(part, springs, 6)[0]
         np.testing.assert_allclose(linear_modes(two_results, springs, 6)[0], exact, rtol=2e-3)
         np.testing.assert_allclose(linear_modes(half, springs, 6)[0], exact, rtol=2e-3)
-
-
-def test_pairs_at_face_centres_move_as_without_relative_coordinates(tmp_path):
-    part = built(tmp_path / "blocks.msh", face_centres=True)
-    system, interface, T = relative(part.system, part.interface)
-    assert interface.n_pair == 16
-    q = np.random.default_rng(0).normal(size=system.n_dof)
-    np.testing.assert_allclose(interface.B @ q, part.interface.B @ (T @ q), atol=1e-12)
-    half = craig_bampton(system, interface, n_modes=25)
-    assert len(half.origin.masters) == 77
-    springs = CONTACT[:16] * 25 / 16
-    exact = linear_modes(part, springs, 6)[0]
-    np.testing.assert_allclose(linear_modes(half, springs, 6)[0], exact, rtol=2e-3)
 
 
 def test_bad_contacts_are_refused_in_one_sentence(part):

@@ -49,12 +49,10 @@ def mapped_gap(rows: np.ndarray, interface: ContactInterface, pairs: slice) -> n
     rows : (n, 4) x, y, z, opening [m], seen along the mean normal of the pairs: linear between the points, that of the
         nearest one outside"""
     tangents = interface.frames[pairs].mean(axis=0)[:2]
-    points = interface.points[pairs] if interface.nodes is None else interface.nodes.points
-    at, targets = rows[:, :3] @ tangents.T, points @ tangents.T
+    at, targets = rows[:, :3] @ tangents.T, interface.points[pairs] @ tangents.T
     opening = scipy.interpolate.LinearNDInterpolator(at, rows[:, 3])(targets)
     outside = ~np.isfinite(opening)
     opening[outside] = scipy.interpolate.NearestNDInterpolator(at, rows[:, 3])(targets[outside])
-    opening = opening if interface.nodes is None else interface.mean[pairs] @ opening
     return np.asarray(opening - opening.min())
 
 

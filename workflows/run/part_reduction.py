@@ -42,8 +42,8 @@ def contacts(scene: MeshScene) -> list[ContactFaces]:
     for name, c in scene.joints.items():
         joint_faces = [
             ContactFaces(
-                face, c.t1, c.opposite, components(scene), c.gap, c.vertices_only, c.face_centres, c.plane,
-                c.inclination, c.pairing, c.reach, name,
+                face, c.t1, c.opposite, components(scene), c.gap, c.vertices_only, c.plane, c.inclination, c.pairing,
+                c.reach, name,
             )
             for face in c.groups
         ]  # fmt: skip

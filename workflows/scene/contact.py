@@ -120,9 +120,6 @@ class FaceContact(ContactTable, stage=PART):
     face."""
     vertices_only: StrictBool = False
     """Leave the mid-side nodes of the mesh out; without, faces of tetrahedra have their pairs at these alone."""
-    face_centres: StrictBool = False
-    """One pair at the centre of each face of an element, by the mean motion of its corners, instead of pairs at nodes:
-    one-point integration, as zero-thickness elements of other programs have it."""
     gap: Length | None = None
     """Initial gap of all pairs; by default that of the geometry, interference negative, and 0 against the ground."""
     gap_map: Annotated[str | None, CONTACT] = None
