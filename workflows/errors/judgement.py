@@ -16,7 +16,6 @@ from tribodyn.hbm.quantity import (
     CurveQuantity,
     CycleQuantity,
     ErrorKind,
-    SolvedCycle,
     StatedQuantity,
     WearQuantity,
     of_wear_with_error,
@@ -33,7 +32,6 @@ from tribodyn.workflows.errors.time_comparison import MotionDifference
 from tribodyn.workflows.result.answers import solved_curve, worn_contact
 from tribodyn.workflows.result.result import Result
 from tribodyn.workflows.result.verdict import MeasuredChange, Refinement, Statement, Status, Verdict
-from tribodyn.workflows.run import settings
 from tribodyn.workflows.run.modelling import Model
 from tribodyn.workflows.run.progress import Progress
 from tribodyn.workflows.scene.scene_file import SceneFile
@@ -187,7 +185,7 @@ def unbounded(quantity: StatedQuantity, table: ChangeTable, least: float = 0.02)
     first, last, ratio = table.first, table.last, table.ratio
     if quantity.where is None or first is None or last is None or last.balance.stress is None or ratio is None:
         return ""
-    cycles = [SolvedCycle.of(each.balance, each.point.state, settings.OUTPUT) for each in (first, last)]
+    cycles = [first.cycle, last.cycle]
     if isinstance(quantity, CycleQuantity):
         where, rows = quantity.where(cycles[1]), table.of(quantity.name)
         values = [(row.value or 0.0, row.refined or 0.0) for row in rows if row.refinement == Refinement.MESH]

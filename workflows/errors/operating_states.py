@@ -4,11 +4,12 @@ from __future__ import annotations
 
 from contextlib import suppress
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 
 from tribodyn.hbm import newton
-from tribodyn.hbm.balance import HarmonicBalance, State
+from tribodyn.hbm.balance import HarmonicBalance
 from tribodyn.hbm.continuation import harmonic_choice
 from tribodyn.hbm.continuation.branch import Branch
 from tribodyn.hbm.continuation.operating_condition import OperatingCondition
@@ -43,15 +44,19 @@ class OperatingState:
     site: OperatingCondition | PeakOfCurve
     point: OperatingPoint
 
-    @property
+    @cached_property
+    def cycle(self) -> SolvedCycle:
+        """The solved cycle, whose quantities are stated."""
+        return SolvedCycle.of(self.balance, self.point.state, settings.OUTPUT)
+
+    @cached_property
     def values(self) -> Values:
         """Values of the quantities of a cycle whose errors are stated."""
-        return values_of(self.balance, self.point.state)
+        return values_of(self.cycle)
 
 
-def values_of(balance: HarmonicBalance, state: State) -> Values:
+def values_of(cycle: SolvedCycle) -> Values:
     """Values of the quantities of a cycle whose errors are stated."""
-    cycle = SolvedCycle.of(balance, state, settings.OUTPUT)
     values = {quantity.name: quantity.value(cycle) for quantity in with_error(CycleQuantity)}
     return {name: value for name, value in values.items() if value is not None}
 
@@ -175,7 +180,7 @@ def changes_near_peak(state: OperatingState, site: AtPeak) -> Values:
     for omega in (peak.omega - reach, peak.omega + reach):
         solution = newton.solve(balance, omega, peak.x, site.newton)
         if solution.converged:
-            for name, value in values_of(balance, solution.state).items():
+            for name, value in values_of(SolvedCycle.of(balance, solution.state, settings.OUTPUT)).items():
                 changes[name] = max(changes[name], relative_change(value, values[name]))
     return changes
 
@@ -290,7 +295,7 @@ def _estimated(state: OperatingState, highest: int) -> tuple[harmonic_choice.Est
     The step is one at a fixed frequency: that of a peak is taken to move by as much as the response changes"""
     wide, point, values = _widened(state, highest), state.point.state, state.values
     estimate = harmonic_choice.estimate(wide, state.balance.basis.harmonics, point.omega, point.x)
-    changed = values_of(wide, wide.evaluate(point.omega, estimate.x, jacobian=False))
+    changed = values_of(SolvedCycle.of(wide, wide.evaluate(point.omega, estimate.x, jacobian=False), settings.OUTPUT))
     remaining = {name: relative_change(value, changed[name]) for name, value in values.items()}
     if not isinstance(state.site, AtFrequency):
         remaining[place_of_peak()] = estimate.error
