@@ -156,9 +156,9 @@ def _turning_modes(K: np.ndarray, M: np.ndarray, G: np.ndarray, n: int) -> tuple
     # rigid motions: a shift too small to be seen keeps A definite
     square = np.maximum(lowest, 1e-7 * lowest[-1]) ** 2
     root = np.sqrt(np.concatenate([square, np.ones(m)]))
-    slowness, y = eigh(np.block([[-H, np.eye(m)], [np.eye(m), np.zeros((m, m))]]) / np.outer(root, root))
-    fastest = np.flatnonzero(slowness > 0)[::-1][:n]
-    return 1.0 / slowness[fastest], phi @ (y[:m, fastest] / root[:m, None])
+    pencil = np.block([[-H, np.eye(m)], [np.eye(m), np.zeros((m, m))]]) / np.outer(root, root)
+    slowness, y = eigh(pencil, subset_by_index=(2 * m - min(n, m), 2 * m - 1))  # of both signs, m of each
+    return 1.0 / slowness[::-1], phi @ (y[:m, ::-1] / root[:m, None])
 
 
 def frequencies(values: np.ndarray, K: Any, M: Any) -> np.ndarray:
