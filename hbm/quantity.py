@@ -47,7 +47,8 @@ class StatedQuantity:
     relative : whether its changes count over its value
     error : how its error is found; rank : place in tables, ascending
     headline : whether the short summary gives it; digits : significant ones of a value whose error is not known
-    where : what the value is of -> node or name of the place of the part whose stress it is, "" or None for none"""
+    where : what the value is of -> node or name of the place of the part whose stress it is, "" or None for none
+    order : of its convergence with the element size, where that is not the one of the error rule"""
 
     title: str
     unit: str
@@ -60,6 +61,7 @@ class StatedQuantity:
     headline: bool = True
     digits: int = 3
     where: Callable[[Any], int | str] | None = None
+    order: float | None = None
     name: str = ""
 
     @property

@@ -16,5 +16,5 @@ def numbers(cycle: SolvedCycle) -> dict[int, float]:
 
 QUANTITY = CycleQuantity(
     "indicator of Ruiz at the contact", "Pa N/m", by_joint=True, error=ErrorKind.CYCLE, rank=46, headline=False,
-    **largest_of(numbers),
+    order=0.5, **largest_of(numbers),
 )  # fmt: skip

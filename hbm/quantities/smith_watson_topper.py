@@ -8,5 +8,5 @@ from tribodyn.hbm.quantity import CycleQuantity, ErrorKind, largest_of
 
 QUANTITY = CycleQuantity(
     "indicator of Smith, Watson and Topper at the contact", "Pa", by_joint=True, error=ErrorKind.CYCLE, rank=45,
-    headline=False, **largest_of(lambda cycle: cycle.largest_of_pairs(lambda stress: stress.watson)),
+    headline=False, order=0.5, **largest_of(lambda cycle: cycle.largest_of_pairs(lambda stress: stress.watson)),
 )  # fmt: skip

@@ -3,6 +3,7 @@
 import ast
 import json
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -10,6 +11,8 @@ import pytest
 
 import tribodyn as td
 from tribodyn.hbm import quantity
+from tribodyn.workflows.errors.judgement import total_error
+from tribodyn.workflows.errors.refinement_limits import DEFAULT
 from tribodyn.workflows.export import result_tables
 from tribodyn.workflows.report import charts, page, text
 from tribodyn.workflows.result.verdict import Refinement
@@ -33,7 +36,7 @@ def slopes(cycle):
     return replace(by_amplitude, by_response=cycle.omega * by_amplitude.by_response, by_omega=cycle.amplitude)
 
 
-QUANTITY = CycleQuantity("velocity amplitude", "m/s", value, error=ErrorKind.CYCLE, slopes=slopes)
+QUANTITY = CycleQuantity("velocity amplitude", "m/s", value, error=ErrorKind.CYCLE, slopes=slopes, order=0.02)
 '''
 SMALL = (
     "harmonics.kept=[0, 1]", "geometry.n_patch=3", "geometry.n_length=3", "geometry.n_height=1", "reduction.modes=4",
@@ -76,8 +79,10 @@ def test_it_stands_in_the_summary_and_in_the_text(result: td.Result) -> None:
 def test_its_error_is_measured(result: td.Result) -> None:
     statement = result.verdict.statements[NAME]
     assert statement.value == pytest.approx(expected(result), rel=1e-3)
-    changed = {row.refinement for row in result.verdict.changes if row.quantity == NAME and row.relative is not None}
-    assert changed >= {Refinement.MODES, Refinement.HARMONICS, Refinement.SAMPLES}
+    rows = [row for row in result.verdict.changes if row.quantity == NAME and row.relative is not None]
+    assert {row.refinement for row in rows} >= {Refinement.MODES, Refinement.HARMONICS, Refinement.SAMPLES}
+    error, _ = total_error(rows, result.verdict.worn_ratio, replace(DEFAULT, order=0.02))
+    assert statement.error == pytest.approx(error)
 
 
 def test_it_stands_in_report_and_exports(result: td.Result) -> None:

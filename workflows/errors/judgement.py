@@ -117,7 +117,8 @@ def _statement(quantity: StatedQuantity, table: ChangeTable, comparison: MotionD
         return Statement(value, 0.0, None, Status.REPORTED, "given by the scene")
     rows = table.of(quantity.name)
     worn = wears or any(row.refinement == Refinement.COMBINED for row in rows)
-    error, reason_unknown = total_error(rows, table.worn_ratio if worn else table.ratio, limits)
+    of_order = replace(limits, order=quantity.order or limits.order)
+    error, reason_unknown = total_error(rows, table.worn_ratio if worn else table.ratio, of_order)
     if isinstance(quantity, CycleQuantity) and at_peak and not quantity.at_rest and error is not None:
         # compliance goes with the square of the frequency: a height that a refinement changes less agrees by chance
         moves, meshed = table.of(place_of_peak()), (Refinement.MODES, Refinement.MESH)
