@@ -81,7 +81,7 @@ def test_its_error_is_measured(result: td.Result) -> None:
     assert statement.value == pytest.approx(expected(result), rel=1e-3)
     rows = [row for row in result.verdict.changes if row.quantity == NAME and row.relative is not None]
     assert {row.refinement for row in rows} >= {Refinement.MODES, Refinement.HARMONICS, Refinement.SAMPLES}
-    error, _ = total_error(rows, result.verdict.worn_ratio, replace(DEFAULT, order=0.02))
+    error, _ = total_error(rows, result.verdict.ratio, replace(DEFAULT, order=0.02))
     assert statement.error == pytest.approx(error)
 
 
