@@ -33,6 +33,20 @@ def large(*sizes: str, as_json: Json = False) -> None:
     print(json.dumps([asdict(row) for row in costs], indent=2) if as_json else large_fe.as_text(costs))
 
 
+def speed(*highest: int, dense_points: int = 2) -> None:
+    """Follow the response of the thesis's beam beside the dense algorithm: seconds, their ratio, differences.
+
+    Parameters
+    ----------
+    highest
+        Highest harmonics; 1, 3 and 5 by default.
+    dense_points
+        Points that the dense algorithm solves in each of three parts of the range."""
+    from proof import speed as comparison
+
+    comparison.run(highest or (1, 3, 5), dense_points, print)
+
+
 def bench(*problems: str, run: Flag = False, truth: Flag = False, page: Flag = False) -> None:
     """Compare programs on problems of vibration with friction and contact: errors beside the truth, and seconds.
 
@@ -248,7 +262,7 @@ def wear(*, scenes: int = 12, seconds: float = 60.0, as_json: Json = False) -> N
 
 
 app = cyclopts.App(name="prove", help="Proofs of tribodyn: speed, extremes, faults, errors of unseen scenes.")
-for word in (bench, large, extremes, faults, scoreboard, branches, fuzz, wear, wear_steps, blade, leaf, rig):
+for word in (bench, speed, large, extremes, faults, scoreboard, branches, fuzz, wear, wear_steps, blade, leaf, rig):
     app.command(word)
 
 

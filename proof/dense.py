@@ -4,8 +4,7 @@ Unknowns are all reduced coordinates times all harmonic coefficients; each Newto
 contact tangent included, and factorises it.
 Source  Tamatam 2021, eq. 3.6-3.7, 3.23 and figure 7.3."""
 
-from dataclasses import dataclass, field
-from time import perf_counter
+from dataclasses import dataclass
 
 import numpy as np
 from scipy.sparse import csr_matrix, kron
@@ -13,15 +12,6 @@ from scipy.sparse import csr_matrix, kron
 from tribodyn.hbm.balance import HarmonicBalance
 from tribodyn.hbm.contact.contact_law import ContactCycle
 from tribodyn.hbm.outcome import CONVERGED, Outcome, SolveEnd
-
-
-@dataclass
-class Profile:
-    """Seconds by routine, named as in tables 7.1 to 7.3 of the thesis."""
-
-    contact: float = 0.0
-    balance: float = 0.0
-    inversion: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -45,7 +35,6 @@ class DenseBalance:
     """The same problem as a HarmonicBalance, solved the dense way; real models whose harmonics share one system."""
 
     problem: HarmonicBalance
-    profile: Profile = field(default_factory=Profile)
 
     def __post_init__(self) -> None:
         self.problem.model.require_masters("the dense reference")
@@ -79,9 +68,7 @@ class DenseBalance:
 
     def solve(self, omega: float, start: np.ndarray, tolerance: float = 1e-8, max_steps: int = 40) -> DenseSolution:
         """Full Newton from reduced coordinates `start` (n, n_coeff), residual relative to the excitation."""
-        clock = perf_counter()
         linear = self.dynamic_stiffness(omega)
-        self.profile.balance += perf_counter() - clock
         scale = np.linalg.norm(self.force)
         q = start.ravel().copy()
         outcome = SolveEnd.STEPS_SPENT.say(f" {max_steps} steps")
@@ -94,10 +81,7 @@ class DenseBalance:
             if steps == max_steps:
                 break
             steps += 1
-            jacobian = self.jacobian(linear, cycle)
-            clock = perf_counter()
-            q -= np.linalg.solve(jacobian, residual)
-            self.profile.inversion += perf_counter() - clock
+            q -= np.linalg.solve(self.jacobian(linear, cycle), residual)
         return DenseSolution(omega, q.reshape(-1, self.problem.basis.n_coeff), x, outcome, steps)
 
     def residual(self, linear: np.ndarray, q: np.ndarray) -> tuple[np.ndarray, ContactCycle, np.ndarray]:
@@ -105,21 +89,14 @@ class DenseBalance:
 
         linear : of `dynamic_stiffness`; q : (n n_coeff,) reduced coordinates [m]"""
         p = self.problem
-        clock = perf_counter()
         x = (self._spread @ q).reshape(p.contact.n_pair, -1, p.basis.n_coeff)
         cycle = p.contact.cycle(x, p.basis, p.memory)
-        tick = perf_counter()
         residual = linear @ q - self.force.ravel() + self._spread.T @ cycle.force.ravel()
-        self.profile.contact += tick - clock
-        self.profile.balance += perf_counter() - tick
         return x, cycle, residual
 
     def jacobian(self, linear: np.ndarray, cycle: ContactCycle) -> np.ndarray:
         """(n n_coeff, n n_coeff) derivative of the residual."""
-        clock = perf_counter()
-        jacobian = linear + (self._spread.T @ _block_diagonal(cycle.slope) @ self._spread).toarray()
-        self.profile.balance += perf_counter() - clock
-        return jacobian
+        return linear + (self._spread.T @ _block_diagonal(cycle.slope) @ self._spread).toarray()
 
     def onto_contact(self, matrix: np.ndarray) -> np.ndarray:
         """Contact displacements (n_contact n_coeff, ...) that belong to columns of coordinates (n n_coeff, ...)."""
