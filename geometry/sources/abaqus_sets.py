@@ -135,6 +135,8 @@ class _Sets:
         if kind == "NODE":
             members = [node for item, _ in items for node in self._try(self.assembly.nodes, item, instance, "surface")]
             self._nset(name, members)
+            if any(area not in ("", "1", "1.", "1.0") for _, area in items):
+                self.unused.append(f"areas of nodes of surface '{name}', which a contact takes from its faces")
             return
         corners: list[np.ndarray] = []
         if kind == "UNION":

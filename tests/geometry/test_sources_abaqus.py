@@ -55,6 +55,7 @@ def test_what_the_deck_says_beside_its_mesh(lap):
     node = lap.bodies["Block-2"].node_sets["node Block-2.11"]
     np.testing.assert_allclose(lap.bodies["Block-2"].mesh.doflocs[:, node[0]], [0.0, 0.02, 0.02], atol=1e-12)
     assert any("*PLASTIC" in clause and "*STATIC" in clause for clause in lap.unused)
+    assert "areas of nodes of surface 'Tips', which a contact takes from its faces" in lap.unused
 
 
 def test_orthotropic_stiffness_becomes_engineering_constants():
