@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from tribodyn.hbm.continuation.parameter import LOAD, Parameter
+from tribodyn.hbm.continuation.parameter import Parameter
 from tribodyn.hbm.harmonics import amplitude
 from tribodyn.hbm.newton import Solution
 from tribodyn.hbm.outcome import SOLVED, BranchEnd, Outcome, SolveEnd
@@ -36,8 +36,7 @@ class Branch:
     newton_steps : (n_point,) Newton steps spent
     end : why and where the branch ends; its text is a sentence
     folds : indices of the points that are folds, where the branch turns back
-    parameter_name : what was stepped; parameter : (n_point,) its values, the same as omega where it is the frequency
-    load_factor : (n_point,) on the vibrating loads, which a test under control finds, see `control`"""
+    parameter_name : what was stepped; parameter : (n_point,) its values, the same as omega where it is the frequency"""
 
     omega: np.ndarray
     output_names: tuple[str, ...]
@@ -51,7 +50,6 @@ class Branch:
     folds: tuple[int, ...] = ()
     parameter_name: str = "frequency"
     parameter: np.ndarray = field(default_factory=lambda: np.empty(0))
-    load_factor: np.ndarray = field(default_factory=lambda: np.empty(0))
 
     @property
     def ended(self) -> BranchEnd:
@@ -89,15 +87,9 @@ class Branch:
         amplitudes: np.ndarray = row[:, static] - 1j * row[:, static + 1]
         return amplitudes
 
-    @property
-    def controlled(self) -> bool:
-        """Whether the force of each point was found, not given."""
-        return self.parameter_name != LOAD and len(self.load_factor) > 0 and bool(np.ptp(self.load_factor) > 0)
-
     def height(self, output: str) -> np.ndarray:
-        """(n_point,) what is highest in resonance, -1 at no solution: amplitude [m], per load factor under control."""
-        size = self.amplitude(output) / self.load_factor if self.controlled else self.amplitude(output)
-        return np.where(self.converged, size, -1.0)
+        """(n_point,) amplitude of an output [m], -1 at no solution."""
+        return np.where(self.converged, self.amplitude(output), -1.0)
 
     def highest(self, output: str) -> int:
         """The point that head, errors, pictures, tables and studies speak of: the highest of an output, peak or not."""
@@ -132,8 +124,6 @@ class Branch:
         rows |= {"contact": point.x.reshape(self.contact.shape[1:])}
         if len(self.parameter):
             rows["parameter"] = point.value
-        if len(self.load_factor):
-            rows["load_factor"] = self.load_factor[at - 1]
         grown: dict[str, Any] = {name: np.insert(getattr(self, name), at, row, axis=0) for name, row in rows.items()}
         outcome = (*self.outcome[:at], point.outcome, *self.outcome[at:])
         return replace(self, **grown, outcome=outcome, folds=tuple(i + (i >= at) for i in self.folds))
@@ -208,20 +198,18 @@ class BranchBuilder:
 
     def finish(self, end: Outcome[BranchEnd]) -> Branch:
         """The branch; `end` says why it ends where it ends."""
-        points, x = self.points, np.stack(self.x)
-        balances = [self._parameter.place(p.value)[0] for p in points]
+        points, x, last = self.points, np.stack(self.x), self._parameter.place(self.value[-1])[0]
         return Branch(
             omega=np.array([p.omega for p in points]),
-            output_names=balances[-1].compliance.output_names,
+            output_names=last.compliance.output_names,
             response=np.stack([p.response for p in points]),
             contact=x.reshape(len(x), -1, x.shape[-1]),
             energy=np.array([p.energy for p in points]),
             outcome=tuple(p.outcome for p in points),
             newton_steps=np.array([p.steps for p in points]),
             end=end,
-            harmonics=balances[-1].basis.harmonics,
+            harmonics=last.basis.harmonics,
             folds=tuple(self.folds),
             parameter_name=self._parameter.name,
             parameter=np.array(self.value),
-            load_factor=np.array([balance.load_factor for balance in balances]),
         )

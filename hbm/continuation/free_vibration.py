@@ -50,9 +50,6 @@ class FreeVibration:
     output : whose motion in the reference mode measures the amplitude
     reference_omega : [rad/s]; reference_damping : ratio of the mode with Coriolis forces, damping and flow
     per_amplitude : motion of the output per modal amplitude a; one_system : whether all harmonics see the same
-    column, row : (n,) border of harmonic 1, what acts to hold the amplitude and what measures it
-    sustained : 1 where zeta is that of the term added to the structure, 0 where it says how large a force drives it
-    push : modal force of what acts, per unit of it
     Raises  ValueError for what has no such mode"""
 
     def __init__(self, balance: HarmonicBalance, mode: int | None, output: str | None):
@@ -91,12 +88,6 @@ class FreeVibration:
         self.per_amplitude = float(abs(output_motion[names.index(self.output)]))
         if self.per_amplitude <= 1e-9 * np.abs(self.modes[self.first].O).max():
             raise Refusal(f"output '{self.output}' does not move in mode {mode}: choose another output")
-        self.column, self.row = self.reference, self.reference.conj()
-        self.sustained, self.push = 1.0, 1.0 + 0j
-
-    def driving(self, omega: float, zeta: float, a: float) -> complex:
-        """Factor on what acts in the column, besides what the border needs; none in free vibration."""
-        return 0j
 
     def _reference(self, mode: int | None, open_rows: np.ndarray) -> tuple[np.ndarray, float, float]:
         """Modal shape (n,) of unit mass, frequency [rad/s] and damping ratio of the reference mode."""
@@ -186,14 +177,14 @@ class FreeVibration:
         factors: list[Bordered] = []
         for h, m in zip(self.basis.harmonics, self.modes, strict=True):
             s = 1j * h * omega
-            undamped = (m.lam if h else m.static_lam) + s * s - 2 * self.sustained * zeta * omega * s
+            undamped = (m.lam if h else m.static_lam) + s * s - 2 * zeta * omega * s
             none = np.zeros(self.n)
-            border, corner, border_row = (self.column, 0.0, self.row) if h == 1 else (none, 1.0, none)
+            border, corner = (self.reference, 0.0) if h == 1 else (none, 1.0)
             if m.proportional or (not h and m.flow is None):
-                factors.append(DiagonalBordered(undamped + s * np.diag(m.damping), border, corner, border_row))
+                factors.append(DiagonalBordered(undamped + s * np.diag(m.damping), border, corner, border.conj()))
             else:
                 flow = 0.0 if m.flow is None else m.flow
-                factors.append(DenseBordered(s * m.damping + np.diag(undamped) + flow, border, corner, border_row))
+                factors.append(DenseBordered(s * m.damping + np.diag(undamped) + flow, border, corner, border.conj()))
         rhs = self._rhs(self._modal(self.basis.to_complex(g)), a)
         if self.basis.has_static:
             rhs[:-1, 0] += self.static_load
@@ -201,7 +192,7 @@ class FreeVibration:
         move = self._contact_motion(eta)
         if self.basis.has_static:
             move[:, 0] -= self.base
-        residual = self._residual(a, flat - move, mismatch + self.driving(omega, zeta, a))
+        residual = self._residual(a, flat - move, mismatch)
         return ModePoint(coordinates, a, x, omega, zeta, cycle, eta, residual, factors)
 
     def _modal(self, force: np.ndarray) -> np.ndarray:
@@ -238,7 +229,7 @@ class FreeVibration:
         """x_0 relative to rest and vibration, the vibration and the mismatch relative to the vibration."""
         vibration = self._units(a)[-1]
         scale = np.where(self.basis.order == 0, np.maximum(self._units(a), vibration), vibration)
-        relative = mismatch * self.push / (self.reference_omega**2 * a)
+        relative = mismatch / (self.reference_omega**2 * a)
         return np.concatenate([(x / scale).ravel(), [relative.real, relative.imag]])
 
     def correction(
@@ -264,17 +255,12 @@ class FreeVibration:
         """Derivatives of the residual at fixed x by the logarithm of omega, by zeta and by the logarithm of a."""
         h = np.asarray(self.basis.harmonics)
         damped = np.stack([m.damping @ p.eta[:, i] for i, m in enumerate(self.modes)], axis=1)
-        by_omega = 1j * h * damped + (-2 * h**2 * p.omega - 4j * self.sustained * p.zeta * h * p.omega) * p.eta
-        by_zeta = (-2j * self.sustained * h * p.omega**2) * p.eta
-        drive, per_zeta = (self.driving(p.omega, zeta, p.a) for zeta in (p.zeta, 1.0))
+        by_omega = 1j * h * damped + (-2 * h**2 * p.omega - 4j * p.zeta * h * p.omega) * p.eta
+        by_zeta = (-2j * h * p.omega**2) * p.eta
         slopes = []
-        for rhs, by_drive in (
-            (self._rhs(-p.omega * by_omega, 0.0), 2 * drive),  # it goes as omega^2 zeta a
-            (self._rhs(-by_zeta, 0.0), per_zeta),
-            (self._rhs(0.0, p.a), drive),
-        ):
+        for rhs in (self._rhs(-p.omega * by_omega, 0.0), self._rhs(-by_zeta, 0.0), self._rhs(0.0, p.a)):
             eta, mismatch = self._solve(p.factors, rhs)
-            slopes.append(self._residual(p.a, -self._contact_motion(eta), mismatch + by_drive))
+            slopes.append(self._residual(p.a, -self._contact_motion(eta), mismatch))
         return tuple(slopes)
 
     def outputs(self, p: ModePoint) -> np.ndarray:

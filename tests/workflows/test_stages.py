@@ -169,7 +169,6 @@ CHANGES: list[tuple[str, SceneStage, tuple[str, ...]]] = [
     )),
     ("blocks", SOLVE, ("damping.modal=", "damping.ratios=[0.01, 0.02]", "damping.modes=[0, 1]")),
     ("blocks", SOLVE, ("damping.modal=", "damping.mass=2 1/s", "damping.stiffness=1e-7 s")),
-    ("blocks", SOLVE, ("wear=", 'response.control="amplitude"', "response.amplitude=1 um")),
     ("wheel", SOLVE, ("mistuning.friction=0.1", "mistuning.families=1", "flow.mode=1", "damping.modal=1 %")),
 ]  # fmt: skip
 

@@ -89,7 +89,7 @@ def _spectra(result: Result) -> list[dict[str, Any]]:
             a, b = (frf.response[:, position, names.index(f"{letter}{h}")] for letter in "ab")
             value, kind, text = a - 1j * b, Function.GENERAL, f"{output}, harmonic {h}"
             if h == 1 and force is not None:
-                value, kind, text = value / (force * frf.load_factor), Function.FRF, f"{output} over force, harmonic 1"
+                value, kind, text = value / force, Function.FRF, f"{output} over force, harmonic 1"
             entry = function(
                 kind, text, "frequency", DataKind.FREQUENCY, "Hz", frf.frequency, DataKind.DISPLACEMENT, "m", value
             )
@@ -156,9 +156,8 @@ def response(result: Result, frf: Branch) -> Table:
         columns[f"{name}_amplitude_{unit}"] = frf.amplitude(name)
         for k, term in enumerate(terms(result.harmonics)):
             columns[f"{name}_{term}_{unit}"] = frf.response[:, position, k]
-    columns |= {"load_factor": frf.load_factor}
     if result.driving_force is not None:
-        columns |= {"force_N": abs(result.driving_force) * frf.load_factor}
+        columns |= {"force_N": np.full(len(frf.omega), abs(result.driving_force))}
         for name in frf.output_names if 1 in result.harmonics else ():
             columns[f"{name}_phase_rad"] = np.angle(frf.fundamental(name) / result.driving_force)
     columns |= {"energy_J": frf.energy, "newton_steps": frf.newton_steps, "converged": frf.converged}

@@ -7,7 +7,7 @@ from tribodyn.workflows.pictures import maps
 from tribodyn.workflows.pictures.figures import save
 from tribodyn.workflows.pictures.loop_plots import has_friction, hysteresis
 from tribodyn.workflows.pictures.matplotlib_names import Figure
-from tribodyn.workflows.pictures.response_plots import controlled, output_amplitudes, response
+from tribodyn.workflows.pictures.response_plots import output_amplitudes, response
 from tribodyn.workflows.pictures.wear_plots import COURSES
 from tribodyn.workflows.result.contact_states import has_states
 from tribodyn.workflows.result.result import Result
@@ -24,7 +24,6 @@ def figures(result: Result) -> dict[str, Callable[[Result], Figure]]:
     mapped = len(result.patch.faces) > 0 and has_states(result)
     candidates: list[tuple[str, Callable[[Result], Figure], bool]] = [
         ("frf", response, result.response is not None or result.wear is not None),
-        ("control", controlled, result.response is not None and result.response.controlled),
         ("outputs", output_amplitudes, result.response is not None and len(result.response.displacements) > 1),
         *((name, draw, worn) for name, draw in COURSES.items()),
         ("hysteresis", hysteresis, result.loops is not None and has_friction(result)),

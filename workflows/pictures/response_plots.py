@@ -6,7 +6,6 @@ import numpy as np
 
 from tribodyn.workflows.pictures.figures import (
     axes_of,
-    heading,
     length_unit,
     log_axis,
     positive_range,
@@ -86,29 +85,6 @@ def _curve(axes: Any, result: Result, good: np.ndarray, amplitude: np.ndarray) -
         if at:
             x, y = (np.interp(at, np.arange(len(hertz)), values) for values in (hertz, amplitude))
             axes.plot(x, y, marker, color=RED, ms=6, label=kind)
-
-
-def controlled(result: Result) -> Figure:
-    """Fundamental amplitude, force and phase over frequency of a test whose force was found."""
-    frf, force = present(result.response), result.driving_force
-    good, name = frf.converged, frf.output_names[0]
-    y = frf.fundamental(name)[good]
-    unit, scale = length_unit(float(np.abs(y).max()))
-    phase = np.degrees(np.angle(y if force is None else y * np.conj(force)))
-    size, of = (1.0, "factor on the loads") if force is None else (abs(force), "force / N")
-    rows = ((scale * np.abs(y), f"amplitude / {unit}"), (size * frf.load_factor[good], of), (phase, "phase / deg"))
-    with axes_of(7.2, 6.4, rows=3) as (figure, axes):
-        heading(figure, result, "response under control")
-        for each, (values, label) in zip(axes, rows, strict=True):
-            each.plot(frf.frequency[good], values, color=BLUE)
-            each.set_ylabel(label)
-        for each, (values, _) in zip(axes[:2], rows[:2], strict=True):
-            if values.max() > 1.01 * values.min():
-                log_axis(each.yaxis, *positive_range(values))
-            else:
-                each.set_ylim(0.0, 1.2 * values.max())
-        axes[2].set(ylim=(-190, 190), yticks=(-180, -90, 0, 90, 180), xlabel="frequency / Hz")
-    return figure
 
 
 def output_amplitudes(result: Result) -> Figure:

@@ -104,13 +104,7 @@ def _cycle_lines(result: Result, answers: Sequence[Answer]) -> list[str]:
 
 
 def _curve_lines(result: Result, answers: Sequence[Answer]) -> list[str]:
-    lines, table, curve = [], result.summary(), result.response
-    if curve is not None and curve.controlled:
-        factors = curve.load_factor[curve.converged]
-        force = result.driving_force
-        ends = [abs(force or 1.0) * float(factor) for factor in (factors.min(), factors.max())]
-        texts = [f"{end:.3g} times the loads" if force is None else measured(end, "N") for end in ends]
-        lines.append(f"{'force':{WIDTH}}{texts[0]} to {texts[1]}, found")
+    lines, table = [], result.summary()
     if table["harmonics_error"] is not None:
         lines.append(f"{'harmonics':{WIDTH}}chosen, estimated truncation error {percent(table['harmonics_error'])}")
     numbers = [answer for answer in answers if isinstance(answer.quantity, CurveQuantity)]

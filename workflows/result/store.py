@@ -71,7 +71,7 @@ SCHEMA: dict[str, tuple[type, Arrays]] = {
         ("part", PartMesh, {"node xyz": "points:m", "cell cell_corner": "cells:#node"}),
         ("references", References, {"reference": "omega:rad/s free:m stuck:m"}),
         ("frf", Branch, {
-            "point": "omega:rad/s energy:J newton_steps parameter load_factor", "fold": "folds:#point",
+            "point": "omega:rad/s energy:J newton_steps parameter", "fold": "folds:#point",
             "harmonic": "harmonics",
             "point output coefficient": "response:m", "point contact coefficient": "contact:m",
         }),

@@ -17,14 +17,12 @@ from tribodyn.workflows.scene.schema import MeshScene, Scene
 class SolvedState:
     """A solved state of the contact: what it shares with a WearRow.
 
-    omega : [rad/s]; depth : (n_pair,) worn off [m]; displacement, force : (n_contact, n_coeff) [m], [N]
-    load_factor : on the vibrating loads"""
+    omega : [rad/s]; depth : (n_pair,) worn off [m]; displacement, force : (n_contact, n_coeff) [m], [N]"""
 
     omega: float
     depth: np.ndarray
     displacement: np.ndarray
     force: np.ndarray
-    load_factor: float
 
 
 States = Sequence[SolvedState | WearRow]
@@ -43,12 +41,10 @@ def with_shown(scene: Scene, result: Result, balance: HarmonicBalance, part: Par
         rows = result.wear.rows()
         states += [rows[i] for i in numbers]
     elif (frf := result.response) is not None:
-        loaded = [balance.with_load(float(frf.load_factor[i])) for i in numbers]
-        n_pair = balance.contact.n_pair
-        for b, i in zip(loaded, numbers, strict=True):
+        for i in numbers:
             omega, x = float(frf.omega[i]), frf.contact[i]
-            state = b.evaluate(omega, x.reshape(n_pair, -1, b.basis.n_coeff), jacobian=False)
-            states.append(SolvedState(omega, np.zeros(n_pair), x, state.cycle.force.reshape(x.shape), b.load_factor))
+            state = balance.evaluate(omega, balance.shaped(x), jacobian=False)
+            states.append(SolvedState(omega, np.zeros(len(state.x)), x, state.cycle.force.reshape(x.shape)))
     if part is not None and (scene.pictures.renders or balance.stress is not None):
         fields = displacement_fields(balance, part, states, numbers)
         result = replace(result, fields=fields if scene.pictures.renders else None)
@@ -67,10 +63,7 @@ def displacement_fields(balance: HarmonicBalance, part: Part, states: States, nu
     """Displacement of every node in solved states.
 
     balance : the unworn problem under the load that the states come from; numbers : (n_field,) rows or points"""
-    loaded = [balance.with_load(s.load_factor) if isinstance(s, SolvedState) else balance for s in states]
-    fields = [
-        part.field(full_displacement(b, s.displacement, s.force, s.omega)) for b, s in zip(loaded, states, strict=True)
-    ]
+    fields = [part.field(full_displacement(balance, s.displacement, s.force, s.omega)) for s in states]
     return Fields(np.asarray(numbers), np.stack(fields))
 
 

@@ -98,7 +98,7 @@ def run(
                 follow, count = partial(response_curve.follow_response, scene, folds=False), scene.wear.responses
                 curves = response_curve.worn_responses(result, model.balance, count, follow, advance)
                 result = keep(replace(result, worn=curves))
-        if judge is not None and scene.verdict.enabled and scene.response.control == "force":
+        if judge is not None and scene.verdict.enabled:
             result = judge(file, model, result, progress)
         return keep(replace(result, stage=Stage.COMPLETE))
 

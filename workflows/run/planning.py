@@ -142,7 +142,7 @@ def plan(file: SceneFile) -> Plan:
         wear_steps=steps,
         wear_solves=solves,
         solve_seconds=5e-3 + basis.n_coeff * (COSTS.sparse * full if sparse else COSTS.solve * contact**2),
-        verdict=scene.verdict.enabled and scene.response.control == "force",
+        verdict=scene.verdict.enabled,
         remarks=sizes.remarks,
     )
 

@@ -7,11 +7,10 @@ import numpy as np
 
 from tribodyn.hbm import continuation
 from tribodyn.hbm.balance import HarmonicBalance
-from tribodyn.hbm.continuation import control, curve_peaks, harmonic_choice
+from tribodyn.hbm.continuation import curve_peaks, harmonic_choice
 from tribodyn.hbm.continuation.branch import Branch, BranchPoint
 from tribodyn.hbm.continuation.harmonic_choice import HarmonicChoice
 from tribodyn.hbm.continuation.methods import arc_length
-from tribodyn.hbm.continuation.nonlinear_modes import BackboneOptions
 from tribodyn.hbm.continuation.peak_refinement import NoPeak
 from tribodyn.hbm.continuation.resonance_peak import AtPeak
 from tribodyn.hbm.harmonics import amplitude
@@ -34,10 +33,6 @@ def follow_response(
     method, options = continuation.load(scene.response.method_name), settings.response_options(scene)
     low, high = settings.response_range(scene)
     request = scene.response
-    if request.control == "phase":
-        assert isinstance(request.amplitude, tuple)
-        way = BackboneOptions(request.points, newton=settings.newton_options(scene))
-        return control.phase_resonance(balance, settings.OUTPUT, low, high, *request.amplitude, way)
     ends = (low, high) if request.sweep == "up" else (high, low)
 
     seen: list[tuple[float, float]] = []
@@ -49,15 +44,7 @@ def follow_response(
         hertz, height = measured(point.omega / (2 * np.pi), "Hz", 4), measured(seen[-1][1], "m")
         advance(done / total, f"{sparkline(*np.array(seen).T)} {hertz}, {height}", seen[-1])
 
-    def along(problem: HarmonicBalance) -> Branch:
-        branch_of_method: Branch = method.follow(problem, *ends, options, report if advance else lambda *_: None)
-        return branch_of_method
-
-    if request.control == "amplitude":
-        assert isinstance(request.amplitude, float)
-        controlled = control.constant_response(balance, settings.OUTPUT, request.amplitude)
-        return control.driven(controlled, along(controlled))
-    branch = along(balance)
+    branch: Branch = method.follow(balance, *ends, options, report if advance else lambda *_: None)
     named = "method" in request.model_fields_set and request.method_name != "adaptive"
     as_swept = named or "sweep" in request.model_fields_set
     if folds and branch.ended is BranchEnd.JUMPED and not as_swept:

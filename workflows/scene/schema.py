@@ -102,13 +102,6 @@ class Scene(Table, ABC):
     def joints(self) -> Mapping[str, ContactTable]:
         """The contacts by name."""
 
-    @model_validator(mode="after")
-    def _wears_under_its_loads(self) -> Scene:
-        if self.wears and self.response.control != "force":
-            raise Refusal(f'response.control = "{self.response.control}" is for a contact that does not wear: '
-                             "leave [wear] out, or give wear.max_steps = 0")  # fmt: skip
-        return self
-
     @property
     def wear_table(self) -> Wear:
         """[wear], of a scene that has it."""

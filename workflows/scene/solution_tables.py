@@ -6,7 +6,6 @@ from pathlib import Path
 from typing import Annotated, Any, Literal, Self
 
 from pydantic import (
-    BeforeValidator,
     Field,
     PrivateAttr,
     StrictBool,
@@ -31,13 +30,11 @@ from tribodyn.workflows.scene.fields import (
     STUDY,
     Direction,
     Frequency,
-    Length,
     Number,
     Table,
     UsualRange,
     quantity,
 )
-from tribodyn.workflows.scene.units import to_si
 from tribodyn.workflows.scene.user_files import folder_of, is_user_file, numbers, optional_user_file, user_file
 
 HIGHEST = 15  # harmonic that kept = "auto" may keep, where the scene does not name one
@@ -75,12 +72,6 @@ class Output(Table, stage=PART):
     """Direction in which it is observed."""
 
 
-def _amplitudes(value: object) -> object:
-    if isinstance(value, (list, tuple)):
-        return tuple(to_si(entry, "m") for entry in value)
-    return to_si(value, "m")
-
-
 class Response(Table, stage=SOLVE):
     """The frequency response that is computed."""
 
@@ -94,12 +85,6 @@ class Response(Table, stage=SOLVE):
     """Continuation method: natural, arc_length or adaptive."""
     sweep: Literal["up", "down"] = "up"
     """Way of the sweep through `frequency`. A natural or adaptive one jumps where a measured one does."""
-    control: Literal["force", "amplitude", "phase"] = "force"
-    """What the test holds: the loads as they stand ("force"); the fundamental amplitude of the response ("amplitude");
-    or its lag of a quarter of a cycle behind the load, while the amplitude goes from the first to the second
-    of `amplitude` ("phase"): the mode at rest then lies in `frequency`. The factor on the loads is found."""
-    amplitude: Annotated[Length | tuple[Length, Length], BeforeValidator(_amplitudes)] | None = None
-    """Amplitude that is held, or the two that a phase resonance goes between."""
     stability: StrictBool = False
     """Mark where the curve is stable and where it bifurcates."""
     options: dict[str, int | float] = Field(default_factory=dict)
@@ -125,21 +110,6 @@ class Response(Table, stage=SOLVE):
     @model_validator(mode="after")
     def _remember_the_file(self, info: ValidationInfo) -> Self:
         self._user_file = optional_user_file(folder_of(info), self.method, "response.method")
-        return self
-
-    @model_validator(mode="after")
-    def _controls(self) -> Self:
-        amplitudes = self.amplitude if isinstance(self.amplitude, tuple) else (self.amplitude,)
-        counts = {"force": (), "amplitude": (1,), "phase": (2,)}[self.control]
-        if (self.amplitude is None) != (not counts) or (counts and len(amplitudes) not in counts):
-            kind = {"force": "no amplitude", "amplitude": 'amplitude = "10 um"'}.get(
-                self.control, 'amplitude = ["1 um", "1 mm"]'
-            )
-            raise Refusal(f'expected {kind} with control = "{self.control}"')
-        if counts and (not min(a or 0.0 for a in amplitudes) > 0 or len(set(amplitudes)) < len(amplitudes)):
-            raise Refusal(f"expected amplitude above 0, and two that differ, got {self.amplitude}")
-        if counts and self.stability:
-            raise Refusal(f'expected no stability with control = "{self.control}"')
         return self
 
     @property

@@ -6,7 +6,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
-from typing import Any, Literal
+from typing import Any
 
 import numpy as np
 
@@ -14,7 +14,6 @@ from tribodyn.hbm import continuation, harmonics
 from tribodyn.hbm.balance import HarmonicBalance, State
 from tribodyn.hbm.continuation import nonlinear_modes as modes
 from tribodyn.hbm.continuation.branch import Branch
-from tribodyn.hbm.continuation.control import constant_response, driven, phase_resonance
 from tribodyn.hbm.continuation.methods.arc_length import solve_along_load
 from tribodyn.hbm.continuation.operating_point import AtFrequency
 from tribodyn.hbm.continuation.resonance_peak import AtPeak
@@ -127,38 +126,20 @@ class HertzBalance:
         stop: float,
         points: int | None = None,
         method: str = "natural",
-        *,
-        control: Literal["force", "amplitude", "phase"] = "force",
-        amplitude: float | tuple[float, float] | None = None,
-        output: str | None = None,
         **options: Any,
     ) -> Branch:
         """The response from one frequency to another [Hz] by a continuation method; downwards where start > stop.
 
         points : for the methods that take them; options : of the method, see its `Options`
-        control : what the test holds: the force; the fundamental amplitude [m] of an output, the first by default; or
-            its lag of a quarter of a cycle, while the amplitude goes from the first to the last of two and the mode at
-            rest lies between the frequencies. The force is then the branch's `load_factor`
         Raises  Refusal for methods and options that do not exist"""
-        if control == "phase":
-            if not isinstance(amplitude, tuple):
-                raise Refusal("control of the phase: give the first and the last amplitude [m], as (1e-6, 1e-3)")
-            way = modes.BackboneOptions(points or modes.BackboneOptions.n_points, **options, newton=self.newton)
-            low, high = HZ * min(start, stop), HZ * max(start, stop)
-            return phase_resonance(self.problem, self._output(output), low, high, *amplitude, way)
-        problem = self.problem
-        if control == "amplitude":
-            if not isinstance(amplitude, (int, float)):
-                raise Refusal("control of the amplitude: give the one amplitude [m] that is held")
-            problem = constant_response(problem, self._output(output), amplitude)
         module = continuation.load(method)
         chosen = {**({} if points is None else {"n_points": points}), **options, "newton": self.newton}
         try:
             method_options = module.Options(**chosen)
         except TypeError as wrong:
             raise Refusal(f"continuation {method}: {wrong}") from None
-        branch: Branch = module.follow(problem, HZ * start, HZ * stop, method_options)
-        return driven(problem, branch) if control == "amplitude" else branch
+        branch: Branch = module.follow(self.problem, HZ * start, HZ * stop, method_options)
+        return branch
 
     def stability(self, branch: Branch) -> branch_stability.BranchStability:
         """Stability of every point of a response of this balance, and its bifurcations, by Hill's method."""
