@@ -64,7 +64,7 @@ def result(n_row: int = 9, nx: int = 8) -> Result:
     response = np.stack([0 * omega, slipping.real, -slipping.imag], -1)[:, None]
     frf = Branch(
         omega, ("response",), response, np.zeros((61, 3 * n_pair, 3)), np.abs(slipping), (CONVERGED,) * 61,
-        np.full(61, 3), BranchEnd.REACHED.say(" 700 Hz"), (0, 1), (20, 30), "frequency", omega, np.ones(61),
+        np.full(61, 3), BranchEnd.REACHED.say(" 700 Hz"), (0, 1), (20, 30), "frequency", omega,
     )  # fmt: skip
     rng = np.random.default_rng(1)
     row_response = np.stack([0 * t, 1e-3 * (1 + 4 * t), 1e-4 * t], -1)[:, None]
