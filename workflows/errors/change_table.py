@@ -43,7 +43,7 @@ FEWEST_SAMPLES = 128
 class ChangeTable:
     """Rows of a finished result as they are measured; say : called with what is refined next.
 
-    first : state of the scene before wear, None without one, as `reason` says
+    first : state of the scene before wear, None without one, as `reason` says; refined : that with more harmonics
     ratio : of the refined mesh, None where that was not solved; worn_ratio : of the mesh of the refined wear run
     last : the state on that mesh; wear_harmonics : of the refined wear run
     in_time : values of the state before wear along a motion in time that contradicts it, empty where none does"""
@@ -55,6 +55,7 @@ class ChangeTable:
     limits: RefinementLimits
     rows: list[MeasuredChange] = field(default_factory=list)
     first: OperatingState | None = None
+    refined: OperatingState | None = None
     reason: str = ""
     ratio: float | None = None
     worn_ratio: float | None = None
@@ -112,6 +113,7 @@ class ChangeTable:
         self.wear_harmonics = tuple(range(harmonics[0], max(harmonics[-1] + 3, 6)))
         with self.refusals(Refinement.HARMONICS):
             state, remaining = operating_states.refine_harmonics(first, self.limits)
+            self.refined = state
             text = f"harmonics {', '.join(map(str, state.balance.basis.harmonics))}, and what they leave out"
             self.add(Refinement.HARMONICS, first.values, state.values, text, remaining)
 

@@ -70,17 +70,22 @@ def judge(
 def _compare(table: ChangeTable, state: OperatingState) -> MotionDifference | str | None:
     """The state before wear in time; why that is not stationary; None without an equation in time.
 
-    Where it contradicts the balance it is repeated with time steps half as long. At a frequency that the scene gives,
-    the values in time then stand in place of those of the balance"""
-    limits = table.limits
-    totals = {name: total_error(table.of(name), table.ratio, limits)[0] for name in state.values}
-    at_frequency = isinstance(state.site, AtFrequency)
-    shift = 0.0 if at_frequency else min(totals[place_of_peak()] or 0.0, limits.largest)
+    Where it contradicts the balance it is repeated with time steps half as long. A motion in time leaves out no
+    harmonic: a peak is compared with more of them; at a frequency that the scene gives, values in time are stated where
+    they differ by more than the mesh explains"""
+    limits, at_frequency = table.limits, isinstance(state.site, AtFrequency)
+    changes = {name: size(table.of(name), Refinement.MESH, Refinement.MODES) for name in state.values}
+    bounds = {name: limits.total(change, table.ratio) for name, change in changes.items()}
+    shift = 0.0
+    if not at_frequency:
+        moved = total_error(table.of(place_of_peak()), table.ratio, limits)[0] or 0.0
+        bounds = {name: max(moved, bound + size(table.of(name), Refinement.PLACE)) for name, bound in bounds.items()}
+        state, shift = table.refined or state, min(moved, limits.largest)
     try:
         comparison = time_comparison.compare(state, shift=shift)
-        if comparison.contradicts(totals):
+        if comparison.contradicts(bounds):
             coarse, comparison = comparison.values, time_comparison.compare(state, 2, shift)
-            if at_frequency and comparison.contradicts(totals):
+            if at_frequency and comparison.contradicts(bounds):
                 steps = {name: relative_change(coarse[name], x) for name, x in comparison.values.items()}
                 scatter, mesh = {name: x + comparison.error for name, x in steps.items()}, None
                 if table.last is not None and time_comparison.is_checked(table.last, None, limits):
@@ -91,7 +96,8 @@ def _compare(table: ChangeTable, state: OperatingState) -> MotionDifference | st
         return None
     except SolverFailure as failure:
         return str(failure)
-    return comparison
+    differences = {n: x for n, x in comparison.differences.items() if comparison.contradicts({n: bounds.get(n)})}
+    return replace(comparison, differences=differences)
 
 
 def _statement(quantity: StatedQuantity, table: ChangeTable, comparison: MotionDifference | str | None) -> Statement:
@@ -121,9 +127,9 @@ def _statement(quantity: StatedQuantity, table: ChangeTable, comparison: MotionD
     error, reason_unknown = total_error(rows, table.worn_ratio if worn else table.ratio, of_order)
     if isinstance(quantity, CycleQuantity) and at_peak and not quantity.at_rest and error is not None:
         # compliance goes with the square of the frequency: a height that a refinement changes less agrees by chance
-        moves, meshed = table.of(place_of_peak()), (Refinement.MODES, Refinement.MESH)
-        moved = limits.factor(table.ratio) * sum(row.relative or 0.0 for row in moves if row.refinement in meshed)
-        moved += limits.safety * sum(row.relative or 0.0 for row in moves if row.refinement == Refinement.HARMONICS)
+        moves = table.of(place_of_peak())
+        moved = limits.factor(table.ratio) * size(moves, Refinement.MODES, Refinement.MESH)
+        moved += limits.safety * size(moves, Refinement.HARMONICS)
         if isinstance(comparison, MotionDifference):  # where it leaves the peak, that is another one in time
             frequency, _ = total_error(moves, table.ratio, limits)
             moved += comparison.contradicts(dict.fromkeys(comparison.differences, frequency))
@@ -136,7 +142,7 @@ def _statement(quantity: StatedQuantity, table: ChangeTable, comparison: MotionD
             return Statement(value, error, dominated, Status.UNSTABLE, f"for {unstable:.0%} of the cycles")
     elif quantity.name in table.in_time and first is not None:
         balance = first.values[quantity.name]
-        reason = f"in time; the steady state of the balance, {balance:.3g} {quantity.unit}, is left or is wrong"
+        reason = f"in time; the balance, {balance:.3g} {quantity.unit}, is left or has too few harmonics"
     elif not wears and isinstance(comparison, str):
         return Statement(value, error, dominated, Status.UNSETTLED, comparison)
     elif isinstance(comparison, MotionDifference) and not wears:
@@ -153,27 +159,29 @@ def _statement(quantity: StatedQuantity, table: ChangeTable, comparison: MotionD
     return Statement(value, error, dominated, Status.REPORTED, reason)
 
 
+def size(rows: Sequence[MeasuredChange], *refinements: Refinement) -> float:
+    """Sum of the relative changes by some refinements, of those that were measured."""
+    return sum(row.relative or 0.0 for row in rows if row.refinement in refinements)
+
+
 def total_error(
     rows: Sequence[MeasuredChange], ratio: float | None, limits: RefinementLimits = DEFAULT
 ) -> tuple[float | None, str]:
     """Total error of a quantity from its rows, and why it is not known where it is not.
 
     It is no less than what the wear steps say of themselves: a coarser mesh is worn with the same steps"""
-
-    def size(*refinements: Refinement) -> float:
-        return sum(row.relative or 0.0 for row in rows if row.refinement in refinements)
-
     needed = (
         Refinement.COMBINED, Refinement.MESH, Refinement.HARMONICS, Refinement.SPRINGS, Refinement.OTHER_MOTION,
     )  # fmt: skip
     unknown = [row.description for row in rows if row.relative is None and row.refinement in needed]
     if unknown or not any(row.refinement in (*needed, Refinement.MOTION) for row in rows):
         return None, (*unknown, "no refinement was measured")[0]
-    least = max(size(Refinement.MOTION), size(Refinement.WEAR_STEPS))
-    chance = least if size(Refinement.MOTION) else 0.0  # then means and steps scatter
-    change = max(size(Refinement.COMBINED, Refinement.MESH, Refinement.MODES), chance)
-    truncation = limits.safety * size(Refinement.HARMONICS, Refinement.SAMPLES, Refinement.SPRINGS)
-    return max(limits.total(change, ratio), least) + truncation + size(Refinement.OTHER_MOTION, Refinement.PLACE), ""
+    least = max(size(rows, Refinement.MOTION), size(rows, Refinement.WEAR_STEPS))
+    chance = least if size(rows, Refinement.MOTION) else 0.0  # then means and steps scatter
+    change = max(size(rows, Refinement.COMBINED, Refinement.MESH, Refinement.MODES), chance)
+    truncation = limits.safety * size(rows, Refinement.HARMONICS, Refinement.SAMPLES, Refinement.SPRINGS)
+    motion = size(rows, Refinement.OTHER_MOTION, Refinement.PLACE)
+    return max(limits.total(change, ratio), least) + truncation + motion, ""
 
 
 def unbounded(quantity: StatedQuantity, table: ChangeTable, least: float = 0.02) -> str:

@@ -154,8 +154,8 @@ def compare(state: OperatingState, finer: int = 1, shift: float = 0.0) -> Motion
         nearby, slope = step_shift * omega, (marched(omega * (1 + step_shift))[1] - ratio).imag
         same_phase = omega - nearby * ratio.imag / slope if slope else np.inf
         if abs(same_phase / omega - 1) <= max(step_shift, shift):
-            shifted, _ = marched(same_phase)
-            means = shifted if shifted.spread == 0 else means
+            shifted, nearer = marched(same_phase)  # beyond a fold there is another motion
+            means = shifted if shifted.spread == 0 and abs(nearer - 1) < abs(ratio - 1) else means
     sectors = len(means.energy) // balance.contact.n_pair
     energy = means.energy.reshape(sectors, -1).mean(axis=0)
     motion = MotionInTime(means, sectors, energy, float(means.observed[0]) / sectors)
@@ -167,4 +167,5 @@ def compare(state: OperatingState, finer: int = 1, shift: float = 0.0) -> Motion
             excess = max(abs(value - values[quantity.name]) - least, 0.0)
             differences[quantity.name] = excess / (abs(values[quantity.name]) or abs(value) or 1.0)
     work = np.maximum(balance.energy(solved), 0.0), np.maximum(energy, 0.0)
-    return MotionDifference(state.cycles, *work, differences, means.error, means.spread, values)
+    error = means.error if means.error * work[1].sum() > motion.least_energy else 0.0
+    return MotionDifference(state.cycles, *work, differences, error, means.spread, values)
