@@ -82,11 +82,9 @@ class SolvedCycle:
         places: tuple[StressPlace, ...] = (),
     ) -> SolvedCycle:  # fmt: skip
         """The cycle of a row of a wear history; its displacement and force are left out."""
-        in_time = history.in_time[row]
-        height = float(amplitude(history.response[row, 0], basis.harmonics) if in_time else history.amplitude[row])
         return cls(
-            float(history.omega[row]), basis, history.response[row], height, 0, float(history.preload[row]),
-            history.energy[row], history.normal_force[row], joints=joints, places=places,
+            float(history.omega[row]), basis, history.response[row], float(history.amplitude[row]), 0,
+            float(history.preload[row]), history.energy[row], history.normal_force[row], joints=joints, places=places,
         )  # fmt: skip
 
     @classmethod

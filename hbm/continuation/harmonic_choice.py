@@ -74,14 +74,13 @@ class HarmonicChoice:
     """The harmonics chosen and what they are worth.
 
     harmonics : the set; estimate : of its truncation error at the worst of the frequencies
-    tolerance : that was asked for; omega : frequencies looked at [rad/s]
+    omega : frequencies [rad/s]
     history : sets tried in turn with their estimated errors
     balance : with the chosen harmonics; x : its solutions, one (n_pair, n_component, n_coeff) for each frequency [m]
     outcome : sentence"""
 
     harmonics: tuple[int, ...]
     estimate: Estimate
-    tolerance: float
     omega: tuple[float, ...]
     history: tuple[tuple[tuple[int, ...], float], ...]
     balance: HarmonicBalance
@@ -145,9 +144,7 @@ def choose(
         outcome += f", above the tolerance {options.tolerance:.1e}: {cure}"
     chosen = wide.with_harmonics(harmonics)
     _WIDE[chosen.compliance] = wide.compliance  # where they are chosen again
-    return HarmonicChoice(
-        harmonics, trial.worst, options.tolerance, tuple(omega), tuple(history), chosen, tuple(trial.x), outcome
-    )
+    return HarmonicChoice(harmonics, trial.worst, tuple(omega), tuple(history), chosen, tuple(trial.x), outcome)
 
 
 def widened(balance: HarmonicBalance, highest: int, error: float | None = None) -> HarmonicBalance:

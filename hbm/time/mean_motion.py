@@ -230,9 +230,8 @@ class Follower:
         if stepper.hold is None:
             return True
         chance = RULES.same_scatter * hold_error.std(axis=0) / np.sqrt(len(hold_error))
-        return bool(
-            (np.abs(hold_error.mean(axis=0)) <= self.options.accuracy * abs(stepper.hold.height) + chance).all()
-        )
+        limit = self.options.accuracy * abs(stepper.hold.height) + chance
+        return bool((np.abs(hold_error.mean(axis=0)) <= limit).all())
 
     def _march_options(self) -> Options:
         return Options(self.options.steps, accelerate=False, contact=self.options.contact)

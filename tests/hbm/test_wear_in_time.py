@@ -12,7 +12,9 @@ from tests.helpers.three_pairs import FLIPS_AT, three_pairs
 from tribodyn.hbm import newton
 from tribodyn.hbm.balance import HarmonicBalance
 from tribodyn.hbm.continuation.operating_point import AtFrequency
+from tribodyn.hbm.harmonics import amplitude as amplitude_of
 from tribodyn.hbm.outcome import SolveEnd, WearEnd
+from tribodyn.hbm.quantity import SolvedCycle
 from tribodyn.hbm.stability import floquet
 from tribodyn.hbm.stability.floquet import HILL, MULTIPLIERS, is_stable
 from tribodyn.hbm.time import mean_motion, time_integration
@@ -112,6 +114,9 @@ def test_a_motion_that_a_machine_leaves_is_worn_in_time_and_resumes_bit_for_bit(
     follower.start(flips, newton.solve(flips, FLIPS_AT, complete.displacement[0].reshape(3, 3, -1)).state)
     marched = follower.mean(flips, FLIPS_AT, lambda period: period.energy)
     assert complete.energy[0].sum() == pytest.approx(marched.energy.sum(), rel=0.01)
+    amplitude = SolvedCycle.at_row(complete, 0, flips.basis, {}).amplitude
+    assert amplitude == pytest.approx(marched.amplitude[0], rel=5e-3)
+    assert amplitude != pytest.approx(amplitude_of(complete.response[0, 0], flips.basis.harmonics), rel=0.01)
     along_balance = evolve(error_controlled.Rule(problem, Tolerance(0.05, 1e-6)), 1).energy[0].sum()
     assert abs(complete.energy[0].sum() / along_balance - 1) > 0.04
     interrupted = history(rows[:3], WearEnd.UNFINISHED.say())

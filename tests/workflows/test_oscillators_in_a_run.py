@@ -86,6 +86,16 @@ def test_an_oscillator_that_hammers_on_a_stop_is_right_or_not_reported(gap: floa
     assert item.status != Status.REPORTED or off < (item.error or 0.0)
 
 
+def test_few_harmonics_do_not_count_at_a_given_frequency(tmp_path: Path) -> None:
+    """Gross slip, the response rises to the end of its range: values in time are stated there."""
+    contact = f'components = ["t1"]\nlaw = "jenkins_constant"\ntangential_stiffness = {20 * OMEGA**2}'
+    result = ran(tmp_path, 0.05, f"{contact}\nfriction = 1.0\nnormal_load = {0.6 * OMEGA**2}", 1.0, [3.0, 6.0], [1])
+    item = result.verdict.statements["amplitude"]
+    truth = in_time(result, 0.05, 1.0, spring=20 * OMEGA**2, limit=0.6 * OMEGA**2)
+    assert abs(item.value / truth - 1) < item.error < 0.01
+    assert result.response.amplitude("response").max() < 0.6 * truth
+
+
 @pytest.mark.parametrize(("force", "stable"), [(0.5, True), (1.5, False)])
 def test_negative_damping_that_friction_limits_is_right_or_not_reported(force, stable, tmp_path):
     contact = f'components = ["t1"]\nlaw = "jenkins_constant"\ntangential_stiffness = {4 * OMEGA**2}'

@@ -104,8 +104,7 @@ def to_accuracy(
         }
         errors = {name: stated[name].error if stated[name].stated else None for name in quantities}
         reasons = {name: "" if stated[name].stated else stated[name].reason or stated[name].status for name in errors}
-        too_large = {name: error for name, error in errors.items() if error is not None and error > request.error}
-        reasons |= {name: f"its error is {error:.2g}" for name, error in too_large.items()}
+        reasons |= {name: f"its error is {x:.2g}" for name, x in errors.items() if x and x > request.error}
         unrefined = tuple(name for name, texts in finer.items() if not texts)
         overrides = tuple(f"{key}={value}" for key, value in added.items())
         bound = ErrorBound(request, errors, reasons, overrides, unrefined, number)

@@ -43,7 +43,7 @@ FEWEST_SAMPLES = 128
 class ChangeTable:
     """Rows of a finished result as they are measured; say : called with what is refined next.
 
-    first : state of the scene before wear, None without one, as `reason` says; refined : that with more harmonics
+    first : state of the scene before wear, None without one, as `reason` says
     ratio : of the refined mesh, None where that was not solved; worn_ratio : of the mesh of the refined wear run
     last : the state on that mesh; wear_harmonics : of the refined wear run
     in_time : values of the state before wear along a motion in time that contradicts it, empty where none does"""
@@ -55,7 +55,6 @@ class ChangeTable:
     limits: RefinementLimits
     rows: list[MeasuredChange] = field(default_factory=list)
     first: OperatingState | None = None
-    refined: OperatingState | None = None
     reason: str = ""
     ratio: float | None = None
     worn_ratio: float | None = None
@@ -77,8 +76,7 @@ class ChangeTable:
 
         scatter : relative, of means and time steps
         mesh : row, values in time on another mesh, and which; None where not measured"""
-        balance = {Refinement.HARMONICS, Refinement.SAMPLES}
-        balance |= {Refinement.MODES, Refinement.MESH} if mesh else set()
+        balance = {Refinement.HARMONICS, Refinement.SAMPLES, *((Refinement.MODES, Refinement.MESH) if mesh else ())}
         self.rows = [row for row in self.rows if row.quantity not in values or row.refinement not in balance]
         self.in_time = values
         for name, relative in scatter.items():
@@ -113,7 +111,6 @@ class ChangeTable:
         self.wear_harmonics = tuple(range(harmonics[0], max(harmonics[-1] + 3, 6)))
         with self.refusals(Refinement.HARMONICS):
             state, remaining = operating_states.refine_harmonics(first, self.limits)
-            self.refined = state
             text = f"harmonics {', '.join(map(str, state.balance.basis.harmonics))}, and what they leave out"
             self.add(Refinement.HARMONICS, first.values, state.values, text, remaining)
 
@@ -145,10 +142,9 @@ class ChangeTable:
                 break  # an imported mesh can only be cut
             dofs, unknowns = actual**3 * self.result.facts.full_dofs, actual**2 * first.balance.n_unknown
             if dofs > limits.max_dofs:
-                reason = f"the refined mesh has some {dofs:.2g} DOFs, above the limit of {limits.max_dofs:g}"
+                reason = f"the refined mesh has {dofs:.2g} DOFs, above the limit of {limits.max_dofs:g}"
             elif unknowns > limits.max_unknowns:
-                reason = f"the refined balance has some {unknowns:.2g} unknowns, above the limit of "
-                reason += f"{limits.max_unknowns:g}"
+                reason = f"the refined balance has {unknowns:.2g} unknowns, above the limit of {limits.max_unknowns:g}"
             else:
                 return refine.modes(finer, limits.modes) or finer, actual, ""
         return None, 1.0, reason

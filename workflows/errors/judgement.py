@@ -70,17 +70,14 @@ def judge(
 def _compare(table: ChangeTable, state: OperatingState) -> MotionDifference | str | None:
     """The state before wear in time; why that is not stationary; None without an equation in time.
 
-    Where it contradicts the balance it is repeated with time steps half as long. A motion in time leaves out no
-    harmonic: a peak is compared with more of them; at a frequency that the scene gives, values in time are stated where
-    they differ by more than the mesh explains"""
+    Where it contradicts the balance it is repeated with time steps half as long. It leaves out no harmonic: at a
+    frequency that the scene gives, values in time are stated where they differ by more than the mesh explains"""
     limits, at_frequency = table.limits, isinstance(state.site, AtFrequency)
-    changes = {name: size(table.of(name), Refinement.MESH, Refinement.MODES) for name in state.values}
-    bounds = {name: limits.total(change, table.ratio) for name, change in changes.items()}
-    shift = 0.0
-    if not at_frequency:
-        moved = total_error(table.of(place_of_peak()), table.ratio, limits)[0] or 0.0
-        bounds = {name: max(moved, bound + size(table.of(name), Refinement.PLACE)) for name, bound in bounds.items()}
-        state, shift = table.refined or state, min(moved, limits.largest)
+    bounds = {name: total_error(table.of(name), table.ratio, limits)[0] for name in state.values}
+    shift = 0.0 if at_frequency else min(bounds[place_of_peak()] or 0.0, limits.largest)
+    if at_frequency:
+        changes = {name: size(table.of(name), Refinement.MESH, Refinement.MODES) for name in bounds}
+        bounds |= {name: limits.total(change, table.ratio) for name, change in changes.items()}
     try:
         comparison = time_comparison.compare(state, shift=shift)
         if comparison.contradicts(bounds):
@@ -96,8 +93,7 @@ def _compare(table: ChangeTable, state: OperatingState) -> MotionDifference | st
         return None
     except SolverFailure as failure:
         return str(failure)
-    differences = {n: x for n, x in comparison.differences.items() if comparison.contradicts({n: bounds.get(n)})}
-    return replace(comparison, differences=differences)
+    return comparison
 
 
 def _statement(quantity: StatedQuantity, table: ChangeTable, comparison: MotionDifference | str | None) -> Statement:
