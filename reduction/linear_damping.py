@@ -1,6 +1,6 @@
 """Linear damping of a reduced system."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 
 import numpy as np
 from scipy.linalg import eigh
@@ -11,18 +11,21 @@ from tribodyn.fem.system import SecondOrderSystem
 from tribodyn.refusal import Refusal
 
 
-def modal_damping(system: SecondOrderSystem, ratio: float) -> np.ndarray:
-    """The same damping ratio in every mode of the free system, none for rigid-body modes.
+def modal_damping(system: SecondOrderSystem, ratio: float | Sequence[float]) -> np.ndarray:
+    """The same damping ratio in every mode of the free system, none for rigid-body modes; or one for each.
 
     C = M Phi diag(2 zeta omega) Phi^H M over all modes of the dense system without contact
+    ratio : several are those of the modes that vibrate, in their order, the last that of all further ones
     Returns C (n, n) [N s/m]
     Raises  Refusal for a ratio below 0"""
-    if not ratio >= 0:
+    ratios = np.atleast_1d(ratio)
+    if not (ratios >= 0).all():
         raise Refusal(f"damping: ratio = {ratio}: give a part of critical damping of 0 or more, such as 0.01")
     values, phi, _ = dense_modes(system.stiffness, system.mass)
     # below this an eigenvalue is rounding of a rigid-body mode
     values[values < len(values) * np.finfo(float).eps * values[-1]] = 0.0
-    weighted = (system.mass @ phi) * np.sqrt(2 * ratio * np.sqrt(values))
+    mode = np.arange(len(values)) - np.count_nonzero(values == 0)  # of those that vibrate
+    weighted = (system.mass @ phi) * np.sqrt(2 * ratios[np.clip(mode, 0, len(ratios) - 1)] * np.sqrt(values))
     multiply = zherk if np.iscomplexobj(weighted) else dsyrk
     upper = np.triu(multiply(1.0, weighted))
     return upper + np.triu(upper, 1).conj().T

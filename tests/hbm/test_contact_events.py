@@ -7,7 +7,7 @@ import numba
 import numpy as np
 import pytest
 
-from tests.helpers.contact_draws import CLOSED_FORMS, HARMONICS, law_id
+from tests.helpers.contact_draws import HARMONICS, ONE_SLIDER, law_id
 from tests.helpers.continuation_models import pressed_slab
 from tests.helpers.verification_models import oscillator
 from tribodyn.hbm import newton
@@ -34,7 +34,7 @@ class Parameters:
 '''
 
 
-@pytest.mark.parametrize(("name", "components"), CLOSED_FORMS, ids=law_id)
+@pytest.mark.parametrize(("name", "components"), ONE_SLIDER, ids=law_id)
 @pytest.mark.parametrize("harmonics", HARMONICS, ids=str)
 def test_forces_and_jacobians_are_those_of_the_closed_form(name, components, harmonics):
     law, basis = contact_law.load(name), HarmonicBasis(harmonics, 16, "located")

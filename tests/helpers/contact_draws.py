@@ -19,6 +19,7 @@ LAWS = [
 ]
 EVENT_BASED = [(name, components) for name, components in LAWS if contact_law.is_event_based(contact_law.load(name))]
 CLOSED_FORMS = [(name, components) for name, components in LAWS if hasattr(contact_law.load(name), "event_based_cycle")]
+ONE_SLIDER = [(name, c) for name, c in CLOSED_FORMS if contact_law.load(name).n_state(c) <= len(c)]
 HARMONICS = [(0, 1), (0, 1, 2, 3), (1, 3), (0, 1, 5)]
 
 

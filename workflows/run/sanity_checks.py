@@ -287,8 +287,8 @@ def check_deflection(
     for name, load in {**scene.loads.static, **scene.loads.harmonic}.items():
         if name in system.loads:
             displacement[name] = (largest(solve(system.loads[name] * load.amplitude)), "at rest")
-    ratio = scene.damping.modal
-    if ratio and scene.response.frequency:
+    ratio = np.min(scene.damping.modal or 0.0)
+    if ratio > 0 and scene.response.frequency:
         omega, phi = modes(system.stiffness, system.mass, min(TYPICAL.modes, system.mass.shape[0]))
         low, high = (2 * np.pi * f for f in scene.response.frequency)
         for name, load in scene.loads.harmonic.items():

@@ -234,8 +234,12 @@ class Harmonics(Table, stage=SOLVE):
 class Damping(Table, stage=SOLVE):
     """Structural damping: a ratio for every mode, or Rayleigh's two coefficients."""
 
-    modal: Annotated[Number, Field(ge=0, lt=1), UsualRange(0.0, 0.2), SMOOTH] | None = None
-    """Damping ratio of every mode."""
+    modal: (
+        Annotated[Number, Field(ge=0, lt=1), UsualRange(0.0, 0.2), SMOOTH]
+        | Annotated[tuple[Annotated[Number, Field(ge=0, lt=1)], ...], Field(min_length=1)]
+        | None
+    ) = None
+    """Damping ratio of every mode; a list is that of the modes that vibrate in their order, its last of all further."""
     state: Literal["free", "stuck"] = "free"
     """Whose modes these are: "free" without the contact, or "stuck" with every pair closed."""
     ratios: tuple[Annotated[Number, Field(ge=0, lt=1)], Annotated[Number, Field(ge=0, lt=1)]] | None = None

@@ -132,6 +132,8 @@ def stiffer(wheel: wheels.Wheel, balance: HarmonicBalance) -> Iterator[Parameter
     base, model, damping = BalanceInputs.of(balance), balance.model, wheel.scene.damping
     if damping.ratios is not None:
         raise NoDerivative("damping.ratios goes by two modes of the wheel: give damping.modal, or mass and stiffness")
+    if isinstance(damping.modal, tuple):
+        raise NoDerivative("damping.modal has a ratio for each mode of the wheel: give one for all")
     of_modes = None if damping.modal is None else modal_damping_towards(model.system, damping.modal)
     elastic = wheel.elastic
     for n, P in enumerate(sector_maps(wheel.reduced.sector)):
