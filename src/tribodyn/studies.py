@@ -19,6 +19,7 @@ from tribodyn.workflows.studies.measured.compare import (
     compare as compare,
 )
 from tribodyn.workflows.studies.measured.measured_loops import MeasuredLoops as MeasuredLoops, loops as loops
+from tribodyn.workflows.studies.measured.wear_test import ReplayedTest as ReplayedTest, replay as replay
 from tribodyn.workflows.studies.response_derivatives import (
     ResponseDerivatives as ResponseDerivatives,
     derivatives as derivatives,

@@ -217,7 +217,9 @@ def test_mirror_image_of_the_plane(name, components):
         for c in tangential(components):
             flip = np.ones(len(components))
             flip[c] = -1.0
-            mirrored = memory * np.resize(flip[: min(memory.shape[1], len(tangential(components)) or 1)], memory.shape[1])
+            mirrored = memory * np.resize(
+                flip[: min(memory.shape[1], len(tangential(components)) or 1)], memory.shape[1]
+            )
             second = aft.cycle(law, x * flip[:, None], parameters, basis, mirrored)
             np.testing.assert_allclose(second.force, first.force * flip[:, None], atol=1e-12)
 

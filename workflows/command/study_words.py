@@ -23,6 +23,7 @@ STUDIES: dict[str, tuple[str, str, Into]] = {  # words -> module and function of
     "study converge": ("convergence", "converge", "results"),
     "study forces": ("forces", "forces", "results"),
     "study compare": ("measured.compare", "compare", "results"),
+    "study test": ("measured.wear_test", "replay", "results"),
     "study loops": ("measured.measured_loops", "loops", "results"),
     "study worn": ("scans.worn_scans", "worn", "asked"),
 }

@@ -48,7 +48,7 @@ from tribodyn.workflows.scene.structure_tables import (
     TieTable,
 )
 from tribodyn.workflows.scene.user_files import folder_of
-from tribodyn.workflows.scene.wear import Wear
+from tribodyn.workflows.scene.wear import Wear, WearTestTable
 
 if TYPE_CHECKING:
     from tribodyn.workflows.scene.wheel_scene import WheelScene
@@ -90,6 +90,8 @@ class Scene(Table, ABC):
     """The nonlinear mode that `tribodyn curve backbone` follows by itself."""
     wear: Wear | None = None
     """Wear; left out, nothing wears."""
+    test: WearTestTable | None = None
+    """The test plan that `tribodyn study test` replays."""
     pictures: Pictures = Pictures()
     """What is drawn."""
     solver: Solver = Solver()

@@ -6,12 +6,24 @@ from pathlib import Path
 from types import ModuleType
 from typing import Annotated, Any, ClassVar, Literal, Self
 
+import numpy as np
 from pydantic import BeforeValidator, Field, PrivateAttr, StrictInt, ValidationError, ValidationInfo, model_validator
 
 from tribodyn.declarations import Role, read
 from tribodyn.hbm.wear import law as wear_law, wear_rule
 from tribodyn.refusal import Refusal
-from tribodyn.workflows.scene.fields import DRAW, RESUMABLE, WEAR, Frequency, Length, Number, SceneStage, Table
+from tribodyn.workflows.scene.fields import (
+    DRAW,
+    RESUMABLE,
+    STUDY,
+    WEAR,
+    Force,
+    Frequency,
+    Length,
+    Number,
+    SceneStage,
+    Table,
+)
 from tribodyn.workflows.scene.units import to_si
 from tribodyn.workflows.scene.user_files import (
     LawTable,
@@ -252,3 +264,32 @@ class Wear(JointWearTable, stage=WEAR):
         if self.mission and self.at != type(self).model_fields["at"].default:  # which a result holds beside a mission
             raise Refusal("expected either at or mission, and not both")
         return self
+
+
+class WearTestTable(Table, stage=STUDY):
+    """A wear test at the operating point of [wear], which pauses at marks for sweeps and scans."""
+
+    marks: Annotated[StrictInt, Field(ge=2, le=500)] | tuple[Annotated[Number, Field(ge=0)], ...]
+    """Cycles of the pauses; one whole number is how many of these are spread evenly from the start to the loss of
+    contact."""
+    sweeps: tuple[Annotated[Force, Field(gt=0)], ...] = ()
+    """Forces of the harmonic load, for each a response curve over response.frequency at every mark."""
+    scans: Annotated[StrictInt, Field(ge=0)] = 0
+    """Every which mark has scans of the worn faces and loops, besides the first and the last; 0 for these alone."""
+
+    @model_validator(mode="after")
+    def _rising(self) -> Self:
+        if isinstance(self.marks, tuple) and not (len(self.marks) and (np.diff(self.marks) > 0).all()):
+            raise Refusal(f"expected marks in rising order, such as [0, 500000, 1000000], got {list(self.marks)}")
+        return self
+
+    def cycles(self, life: float) -> np.ndarray:
+        """Cycles of the marks that a contact of this life reaches."""
+        if isinstance(self.marks, int):
+            return np.linspace(0.0, life, self.marks)
+        return np.array([mark for mark in self.marks if mark <= life])
+
+    def is_scanned(self, count: int) -> np.ndarray:
+        """Which of so many marks have scans."""
+        number = np.arange(count)
+        return (number % (self.scans or count) == 0) | (number == count - 1)

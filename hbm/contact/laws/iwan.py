@@ -1,12 +1,11 @@
 """Iwan's joint of four parameters: Jenkins elements side by side, most of them weak, under a variable normal load.
 
-Before full slip a pair holds F(u) = k u - c u^(chi + 2): its loss over a cycle grows with the power chi + 3 of the
-amplitude, so that its damping ratio grows with the power chi + 1; chi = 0 is a density of slip limits that is finite at
-zero. By Segalman: F_S = mu N with the normal force N of the pair, K_T its tangential stiffness, chi the exponent, and
-beta = (1 - weak) / weak. The distribution has SLIDERS - 1 cells in geometric progression, each with the stiffness and
-the slip force of its part, and one slider for the pinning force that all of it reaches at once. From 0.02 of the
-largest reach on, the loss is within 7 % of that of the whole distribution, the force within 2 %.
-Source  Iwan 1966; Segalman, J. Appl. Mech. 72 (2005) 752; cells of equal ratio after it, their midpoints ours"""
+Before full slip a pair holds F(u) = k u - c u^(chi + 2), so that its damping ratio grows with the power chi + 1 of the
+amplitude; at chi = 0 the density of slip limits is finite at zero. By Segalman F_S = mu N, K_T = k, and beta =
+(1 - weak) / weak. The density is split into SLIDERS - 1 cells in geometric progression, each with the stiffness and
+slip force of its part; one slider more has the rest, which slips last. From 0.02 of the largest reach on, the loss of a
+cycle is within 10 % of that of the density itself.
+Source  Iwan 1966; Segalman, J. Appl. Mech. 72 (2005) 752"""
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
@@ -26,13 +25,11 @@ RATIO = 1.4  # of the reach of a slider over that of the one before
 
 
 @dataclass(frozen=True)
-class Parameters:
-    """The law's own numbers."""
+class Parameters(jenkins.Parameters):
+    """The law's own numbers; friction is that of full slip."""
 
-    friction: float = number("", role="friction", low=0.0, usual=(0.0, 1.5))
-    """Coulomb coefficient of full slip."""
     weak: float = number("", default=1.0, low=0.0, high=1.0)
-    """Share of the tangential stiffness that the weak sliders have, 1 / (1 + beta); 0 for one Jenkins element."""
+    """Share of the tangential stiffness that slips bit by bit, 1 / (1 + beta); 0 for one Jenkins element."""
     exponent: float = number("", default=0.0, above=-1.0, high=2.0)
     """Exponent chi of the density of slip limits."""
 
@@ -45,7 +42,7 @@ def n_state(components: tuple[str, ...]) -> int:
 @numba.njit(cache=True)
 def _slider(j, weak, chi):
     """Share of the stiffness of slider j, and its reach over that of a pair that is one Jenkins element."""
-    mean = (chi + 1) / (chi + 2)  # reach of all weak sliders together over the largest
+    mean = (chi + 1) / (chi + 2)  # reach of the density as a whole over the largest
     largest = 1 / (1 - weak + weak * mean)  # as all limits add to mu N
     if j == SLIDERS - 1:
         return 1 - weak, largest
@@ -56,16 +53,10 @@ def _slider(j, weak, chi):
 
 
 @numba.njit(cache=True)
-def _count(weak):
-    """Number of sliders with a stiffness."""
-    return (SLIDERS - 1) * (weak > 0) + (weak < 1)
-
-
-@numba.njit(cache=True)
 def step(x, w, p, f, dfx, dfs, dsx, dss):
     """Advance one pair by one sample; writes force, memory and their derivatives, returns the status bits."""
     t, weak, chi = x.size - 1, p[5], p[6]
-    n = _count(weak)
+    n = (SLIDERS - 1) * (weak > 0) + (weak < 1)  # sliders with a stiffness
     kn = 1 / n * p[t]  # of one slider, as in `_cycle`
     N = kn * (x[t] - p[3])
     f[:] = 0.0
@@ -88,40 +79,32 @@ def step(x, w, p, f, dfx, dfs, dsx, dss):
                 dss[r, r] = 1.0
                 bits |= STICKS
             else:
-                sign = 1.0 if T > 0.0 else -1.0
-                f[c] += sign * mu * N
-                dfx[c, t] += sign * mu * kn
-                w[r] = x[c] - sign * mu * N / kt
+                side = mu if T > 0.0 else -mu
+                f[c] += side * N
+                dfx[c, t] += side * kn
+                w[r] = x[c] - side * N / kt
                 dsx[r, c] = 1.0
-                dsx[r, t] = -sign * mu * kn / kt
+                dsx[r, t] = -side * kn / kt
                 bits |= SLIPS
     return bits
 
 
-@numba.njit(cache=True)
-def _sliders(weak, chi):
-    """(n_pair, SLIDERS) shares and reaches."""
-    share, reach = np.empty((weak.size, SLIDERS)), np.empty((weak.size, SLIDERS))
-    for i in range(weak.size):
-        for j in range(SLIDERS):
-            share[i, j], reach[i, j] = _slider(j, weak[i], chi[i])
-    return share, reach
-
-
 def _cycle(
-    of_elements: Callable[..., ContactCycle],
-    x: np.ndarray, parameters: ContactParameters, memory: np.ndarray, basis: HarmonicBasis, jacobian: bool,
+    of_elements: Callable[..., ContactCycle], x: np.ndarray, parameters: ContactParameters, memory: np.ndarray,
+    basis: HarmonicBasis, jacobian: bool,
 ) -> ContactCycle:  # fmt: skip
     """The sum of the cycles of all Jenkins elements with a stiffness; each has its part of the normal spring."""
-    numbers, n_t = parameters.numbers, len(parameters.components) - 1
-    share, reach = _sliders(numbers["weak"], numbers["exponent"])
-    pair, slider = np.nonzero(share)
-    first, n_active = np.flatnonzero(np.diff(pair, prepend=-1)), np.count_nonzero(share, axis=1)
-    scale = np.full((len(pair), n_t + 1), 1 / n_active[pair, None])
-    scale[:, :-1] = share[pair, slider, None]
-    friction = (share * reach * n_active[:, None] * numbers["friction"][:, None])[pair, slider]
-    elements = replace(parameters.subset(pair), numbers={"friction": friction})
-    elements = replace(elements, stiffness=scale * elements.stiffness)
+    n_t = len(parameters.components) - 1
+    shapes = np.stack([parameters.numbers[name] for name in ("weak", "exponent")], axis=1)
+    kinds, kind = np.unique(shapes, axis=0, return_inverse=True)
+    sliders = np.array([[_slider(j, *numbers) for j in range(SLIDERS)] for numbers in kinds.tolist()])[kind]
+    pair, slider = np.nonzero(sliders[..., 0])
+    first, n_active = np.flatnonzero(np.diff(pair, prepend=-1)), np.bincount(pair)[pair]
+    share, reach = sliders[pair, slider].T
+    scale = np.append(np.repeat(share[:, None], n_t, axis=1), 1 / n_active[:, None], axis=1)
+    elements = parameters.subset(pair)
+    friction = share * reach * n_active * elements.numbers["friction"]
+    elements = replace(elements, stiffness=scale * elements.stiffness, numbers={"friction": friction})
     rest = np.ascontiguousarray(memory.reshape(-1, SLIDERS, n_t)[pair, slider])
     cycle = of_elements(x[pair], elements, rest, basis, jacobian)
     slope = np.add.reduceat(cycle.slope, first) if jacobian else None
