@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from hypothesis import given, strategies as st
 
-from tests.helpers.contact_draws import CLOSED_FORMS, HARMONICS, law_id
+from tests.helpers.contact_draws import CLOSED_FORMS, HARMONICS, ONE_SLIDER, law_id
 from tests.helpers.random_problems import cases
 from tribodyn.hbm.contact import aft, contact_law, jenkins_cycle, segment_integrals, trigonometric
 from tribodyn.hbm.contact.contact_law import SEPARATES, SLIPS, STICKS, ContactParameters
@@ -41,7 +41,7 @@ def fine_force(x, k, mu, load, memory, basis, n=40_000):
     return weight * np.trapezoid(force[:, None] * basis.functions(angle), angle, axis=0)
 
 
-@EVERY_LAW
+@pytest.mark.parametrize(("name", "components"), ONE_SLIDER, ids=law_id)
 @pytest.mark.parametrize("harmonics", HARMONICS[1:3], ids=str)
 def test_against_a_fine_integration(name, components, harmonics):
     law = contact_law.load(name)

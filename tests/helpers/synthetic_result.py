@@ -15,7 +15,6 @@ from tribodyn.workflows.result.result import (
     References,
     Result,
     Stress,
-    WornResponses,
 )
 from tribodyn.workflows.scene.scene_file import read
 
@@ -99,11 +98,10 @@ def result(n_row: int = 9, nx: int = 8) -> Result:
     stability = BranchStability(
         np.abs(np.arange(61) - 25) > 5, np.full(61, -1.0), omega[[20, 30]], np.array([20.5, 30.5]), ("fold", "fold")
     )
-    worn = WornResponses(rows, np.tile(omega, (3, 1)), np.abs([resonance(hertz, 0.015) for hertz in (510, 460, 420)]))
     facts = ModelFacts(seconds=12.5, delta_max=5e-3, unknowns=9 * n_pair, model_dofs=3 * n_pair + 17, harmonics=(0, 1))
     return Result(
         provenance={"scene_name": "beam", "scene_text": file.text}, scene=file.scene, facts=facts, part=part,
-        stage=Stage.COMPLETE, patch=where, response=frf, stability=stability, wear=wear, worn=worn, loops=loops,
+        stage=Stage.COMPLETE, patch=where, response=frf, stability=stability, wear=wear, loops=loops,
         references=References(omega, np.abs(resonance(415, 0.01)), np.abs(resonance(530, 0.01))),
         fields=Fields(rows, bend),
         stress_field=Stress(rows, *stress, *of_pairs, spot, np.zeros((len(rows), 1, 3)), spot),

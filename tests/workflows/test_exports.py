@@ -58,7 +58,7 @@ def test_pandas_reads_every_table_with_all_digits(tmp_path: Path) -> None:
         assert list(read.columns) == list(expected)
         for name, column in expected.items():
             np.testing.assert_array_equal(read[name].to_numpy(), column)
-    assert {"response", "wear", "wear_of_pairs", "pairs", "loops", "references", "worn_responses"} <= {
+    assert {"response", "wear", "wear_of_pairs", "pairs", "loops", "references"} <= {
         path.stem for path in (tmp_path / "csv").iterdir()
     }
 

@@ -162,7 +162,7 @@ CHANGES: list[tuple[str, SceneStage, tuple[str, ...]]] = [
         "response.stability=true", 'response.references=["1 kHz", "9 kHz"]',
         'response.sweep="down"', "harmonics.kept=[0, 1, 2]", "harmonics.samples=64", 'harmonics.transitions="sampled"',
         "damping.modal=2 %", 'damping.state="stuck"', "solver.tolerance=1e-7", "preload.frictionless=true",
-        "wear.coefficient=1e3 um3/J", 'wear.step="3 %"', "wear.max_steps=7", "wear.responses=2", "wear.split=0.3",
+        "wear.coefficient=1e3 um3/J", 'wear.step="3 %"', "wear.max_steps=7", "wear.split=0.3",
         'wear.rule="error_controlled"', "wear.tolerance=0.1", "wear.lost_below=0.1", 'wear.at="5 kHz"',
         "verdict.enabled=false", "verdict.in_time=true", "backbone.mode=1", "backbone.points=9", 'scene.title="other"',
         "pictures.plots=false", "pictures.wear_scale=3", "pictures.deformation_scale=3",

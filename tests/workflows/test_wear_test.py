@@ -42,6 +42,9 @@ def test_marks_are_those_of_the_scenes_own_wear(replayed: td.studies.ReplayedTes
     branch = response_curve.follow_response(file.scene, model.balance.worn(history.depth[-1]).with_load(0.4))
     last = {name: column[-1] for name, column in replayed.tables["peaks"].items()}
     assert last["force_N"] == 4000
+    hertz = replayed.tables["peaks"]["frequency_hz"][1::2]  # from the stuck beam to the free one
+    assert np.all(np.diff(hertz) <= 0)
+    assert hertz[-1] == pytest.approx(model.reduced.free_frequency[0], rel=0.05)
     assert last["amplitude_m"] == branch.amplitude("response").max()
     assert (
         set(replayed.tables["scans"]["cycles"])

@@ -132,15 +132,6 @@ def tables(result: Result) -> dict[str, Table]:
     if result.wear is not None and len(result.wear.cycles):
         tables_by_name["wear"] = wear(result, result.wear)
         tables_by_name["wear_of_pairs"] = wear_of_pairs(result.wear, result.patch)
-    if result.worn is not None:
-        count = result.worn.omega.shape[1]
-        flat = {
-            "row": np.repeat(result.worn.row, count),
-            "frequency_Hz": result.worn.omega.ravel() / (2 * np.pi),
-            "amplitude_m": result.worn.amplitude.ravel(),
-        }
-        is_solved = np.isfinite(flat["frequency_Hz"])
-        tables_by_name["worn_responses"] = {name: column[is_solved] for name, column in flat.items()}
     if result.loops is not None:
         tables_by_name["loops"] = loops(result.loops, result.patch)
     return tables_by_name

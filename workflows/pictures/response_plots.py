@@ -13,7 +13,7 @@ from tribodyn.workflows.pictures.figures import (
     shade_beyond_linear_model,
     titled,
 )
-from tribodyn.workflows.pictures.matplotlib_names import Figure, mpl
+from tribodyn.workflows.pictures.matplotlib_names import Figure
 from tribodyn.workflows.pictures.theme import BLUE, CYCLE, GREY, INK, ORANGE, RED, WEAR_MAP
 from tribodyn.workflows.pictures.wear_plots import cycle_unit, with_gaps
 from tribodyn.workflows.result.contact_states import shown_cycles
@@ -50,10 +50,6 @@ def response(result: Result) -> Figure:
                 vmax=scale_cycles * shown_cycles(wear), label="cycle at each wear step",
             )  # fmt: skip
             figure.colorbar(dots, ax=axes, label=f"vibration cycles{unit_cycles}", pad=0.02)
-            if result.worn is not None:
-                colors = mpl.colormaps[WEAR_MAP](wear.cycles[result.worn.row] / shown_cycles(wear))
-                for omega, amplitude, color in zip(result.worn.omega, result.worn.amplitude, colors, strict=True):
-                    axes.plot(omega / (2 * np.pi), scale * amplitude, color=color)
         drawn = np.concatenate([line.get_ydata() for line in axes.lines])
         log_axis(axes.yaxis, *positive_range(drawn))
         shade_beyond_linear_model(axes, result, scale)

@@ -80,10 +80,6 @@ def _response(results: Sequence[tuple[str, Result]]) -> Chart:
             if result.stability is not None:
                 height = np.where(good & ~result.stability.stable, 1e3 * frf.amplitude(frf.output_names[0]), np.nan)
                 data.append(_line(f"{name}: unstable", frf.frequency, height, line={"color": "#d55e00", "width": 4}))
-        if result.worn is not None:
-            for row, omega, height in zip(result.worn.row, result.worn.omega, result.worn.amplitude, strict=True):
-                label = state_of(result, int(row)).label
-                data.append(_line(f"{name}: {label}", omega / (2 * np.pi), 1e3 * height))
         if result.wear is not None and result.wear_steps:
             hertz, height = with_gaps(result.wear, result.wear.omega / (2 * np.pi), 1e3 * result.wear.amplitude)
             data.append(_line(f"{name}: peak under wear", hertz, height, mode="lines+markers", marker={"size": 4}))

@@ -188,19 +188,6 @@ class Loops:
 
 
 @dataclass(frozen=True)
-class WornResponses:
-    """Response curves of the worn contact.
-
-    row : (n_curve,) rows of the wear history whose depth the curves have
-    omega, amplitude : (n_curve, n_curve_point) [rad/s], of the first output [m]; nan after the end of a curve and where
-        a point did not converge"""
-
-    row: np.ndarray
-    omega: np.ndarray
-    amplitude: np.ndarray
-
-
-@dataclass(frozen=True)
 class Result:
     """A run, finished or not.
 
@@ -220,7 +207,6 @@ class Result:
     response: Branch | None = None
     stability: BranchStability | None = None
     wear: WearHistory | None = None
-    worn: WornResponses | None = None
     fields: Fields | None = None
     stress_field: Stress | None = None
     loops: Loops | None = None

@@ -33,7 +33,6 @@ from tribodyn.workflows.result.result import (
     References,
     Result,
     Stress,
-    WornResponses,
 )
 from tribodyn.workflows.result.verdict import Verdict
 from tribodyn.workflows.scene import scene_file
@@ -84,7 +83,6 @@ SCHEMA: dict[str, tuple[type, Arrays]] = {
             "row duty": "duty_omega:rad/s", "row duty contact coefficient": "duty_displacement:m",
             "row duty output coefficient": "duty_response:m",
         }),
-        ("worn", WornResponses, {"curve": "row:#row", "curve curve_point": "omega:rad/s amplitude:m"}),
         ("fields", Fields, {"field": "row:#row", "field node xyz coefficient": "displacement:m"}),
         ("stress_field", Stress, {
             "field": "row:#row", "field spot": "spot:#node spot_kind", "field spot xyz": "spot_point:m",

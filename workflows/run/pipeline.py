@@ -1,4 +1,4 @@
-"""From a scene to a result: model, response, what the scene asks about it, wear, worn responses.
+"""From a scene to a result: model, response, what the scene asks about it, wear.
 
 A result holds provenance, sizes, patch and mesh before anything is solved."""
 
@@ -7,7 +7,6 @@ import platform
 from collections.abc import Callable
 from dataclasses import replace
 from datetime import UTC, datetime
-from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -93,11 +92,6 @@ def run(
                 result = wear_run.wear_down(file, model, result, keep, advance)
         else:
             result = with_shown(scene, result, model.balance, model.part)
-        if scene.wear is not None and scene.wear.responses and result.wear_steps:
-            with progress.track("responses of the worn contact") as advance:
-                follow, count = partial(response_curve.follow_response, scene, folds=False), scene.wear.responses
-                curves = response_curve.worn_responses(result, model.balance, count, follow, advance)
-                result = keep(replace(result, worn=curves))
         if judge is not None and scene.verdict.enabled:
             result = judge(file, model, result, progress)
         return keep(replace(result, stage=Stage.COMPLETE))

@@ -1,6 +1,6 @@
 """The response curve of a scene and what it may ask about it: harmonics, stability, wear."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -17,7 +17,6 @@ from tribodyn.hbm.harmonics import amplitude
 from tribodyn.hbm.outcome import BranchEnd
 from tribodyn.refusal import SolverFailure
 from tribodyn.workflows.result.number_format import measured, sparkline
-from tribodyn.workflows.result.result import Result, WornResponses
 from tribodyn.workflows.run import settings
 from tribodyn.workflows.run.progress import Advance
 from tribodyn.workflows.scene.schema import Scene
@@ -94,32 +93,3 @@ def choose_harmonics(
             break
         balance, solved_x = choice.balance, dict(zip(choice.omega, choice.x, strict=True))
     return choice
-
-
-def worn_responses(
-    result: Result,
-    balance: HarmonicBalance,
-    count: int,
-    follow: Callable[[HarmonicBalance], Branch],
-    advance: Callable[[float, str], None],
-) -> WornResponses:
-    """Response curves of the contact as worn as at `count` rows, evenly spread over what is worn, the last included.
-
-    balance : of the unworn contact; follow : what makes a curve of a balance"""
-    assert result.wear is not None
-    wear, patch = result.wear, result.patch
-    volume = wear.depth @ patch.area
-    volumes = volume[-1] * np.arange(1, count + 1) / count
-    rows = np.unique([int(np.argmin(np.abs(volume - v))) for v in volumes])
-    branches = []
-    for i, row in enumerate(rows):
-        worn = balance.worn(wear.depth[row])
-        advance(i / len(rows), f"{i + 1} of {len(rows)}")
-        branches.append(follow(worn))
-    size = max(len(curve.omega) for curve in branches)
-
-    def padded(values: np.ndarray) -> np.ndarray:
-        return np.concatenate([values, np.full(size - len(values), np.nan)])
-
-    heights = [np.where(curve.converged, curve.amplitude(curve.output_names[0]), np.nan) for curve in branches]
-    return WornResponses(rows, np.stack([padded(curve.omega) for curve in branches]), np.stack([*map(padded, heights)]))

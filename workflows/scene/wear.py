@@ -166,8 +166,6 @@ class Wear(JointWearTable, stage=WEAR):
 
     split: Annotated[Number, Field(ge=0, le=1), DRAW] = 0.5
     """Share of the depth that the scene's own part loses, or the first of two faces; the rest wears the other one."""
-    responses: Annotated[StrictInt, Field(ge=0, le=100), RESUMABLE] = 0
-    """Number of response curves of the worn contact, evenly spread over the worn depth."""
     rule: str = "thesis"
     """How the steps are chosen: "thesis" takes `step`, "error_controlled" takes `tolerance`; or a file my_rule.py
     beside the scene, whose own numbers are further keys of this table."""

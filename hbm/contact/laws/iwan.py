@@ -14,7 +14,8 @@ import numba
 import numpy as np
 
 from tribodyn.declarations import number
-from tribodyn.hbm.contact.contact_law import SEPARATES, SLIPS, STICKS, ContactCycle, ContactParameters
+from tribodyn.hbm.contact.compiled_law import stamp_with
+from tribodyn.hbm.contact.contact_law import ContactCycle, ContactParameters
 from tribodyn.hbm.contact.laws import jenkins
 from tribodyn.hbm.harmonics import HarmonicBasis
 
@@ -55,37 +56,20 @@ def _slider(j, weak, chi):
 @numba.njit(cache=True)
 def step(x, w, p, f, dfx, dfs, dsx, dss):
     """Advance one pair by one sample; writes force, memory and their derivatives, returns the status bits."""
-    t, weak, chi = x.size - 1, p[5], p[6]
-    n = (SLIDERS - 1) * (weak > 0) + (weak < 1)  # sliders with a stiffness
-    kn = 1 / n * p[t]  # of one slider, as in `_cycle`
-    N = kn * (x[t] - p[3])
+    t, n = x.size - 1, (SLIDERS - 1) * (p[5] > 0) + (p[5] < 1)  # sliders with a stiffness
+    q, g, bits = np.empty(5), np.empty(t + 1), 0
     f[:] = 0.0
-    f[t] = max(n * N, 0.0)
-    dfx[t, t] = p[t] if N > 0.0 else 0.0
-    bits = 0 if N > 0.0 else SEPARATES
     for j in range(SLIDERS):
-        share, reach = _slider(j, weak, chi)
-        mu = share * reach * n * p[4]
-        for c in range(t):
-            r, kt = j * t + c, share * p[c]
-            T = kt * (x[c] - w[r])
-            if N <= 0.0 or share == 0.0:
-                w[r] = x[c]
-                dsx[r, c] = 1.0
-            elif abs(T) <= mu * N:
-                f[c] += T
-                dfx[c, c] += kt
-                dfs[c, r] = -kt
-                dss[r, r] = 1.0
-                bits |= STICKS
-            else:
-                side = mu if T > 0.0 else -mu
-                f[c] += side * N
-                dfx[c, t] += side * kn
-                w[r] = x[c] - side * N / kt
-                dsx[r, c] = 1.0
-                dsx[r, t] = -side * kn / kt
-                bits |= SLIPS
+        share, reach = _slider(j, p[5], p[6])
+        if share == 0.0:
+            continue
+        q[:t], q[t], q[3], q[4] = share * p[:t], 1 / n * p[t], p[3], share * reach * n * p[4]  # as in `_cycle`
+        rows = slice(j * t, (j + 1) * t)
+        dgx, dgs, dwx, dww = np.zeros((t + 1, t + 1)), np.zeros((t + 1, t)), np.zeros((t, t + 1)), np.zeros((t, t))
+        bits |= jenkins.step(x, w[rows], q, g, dgx, dgs, dwx, dww)
+        f += g
+        dfx += dgx
+        dfs[:, rows], dsx[rows], dss[rows, rows] = dgs, dwx, dww
     return bits
 
 
@@ -123,3 +107,6 @@ def event_based_cycle(
 ) -> ContactCycle:
     """The periodic cycle with the transitions of every slider located between samples."""
     return _cycle(jenkins.event_based_cycle, x, parameters, memory, basis, jacobian)
+
+
+stamp_with(globals(), jenkins)
