@@ -9,6 +9,7 @@ Source  Iwan 1966; Segalman, J. Appl. Mech. 72 (2005) 752"""
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numba
 import numpy as np
@@ -75,7 +76,7 @@ def step(x, w, p, f, dfx, dfs, dsx, dss):
 
 def _cycle(
     of_elements: Callable[..., ContactCycle], x: np.ndarray, parameters: ContactParameters, memory: np.ndarray,
-    basis: HarmonicBasis, jacobian: bool,
+    basis: HarmonicBasis, jacobian: bool = True,
 ) -> ContactCycle:  # fmt: skip
     """The sum of the cycles of all Jenkins elements with a stiffness; each has its part of the normal spring."""
     n_t = len(parameters.components) - 1
@@ -95,18 +96,6 @@ def _cycle(
     return ContactCycle(np.add.reduceat(cycle.force, first), slope, np.bitwise_or.reduceat(cycle.status, first))
 
 
-def sampled_cycle(
-    x: np.ndarray, parameters: ContactParameters, memory: np.ndarray, basis: HarmonicBasis, jacobian: bool = True
-) -> ContactCycle:
-    """The periodic cycle at the samples of the basis."""
-    return _cycle(jenkins.sampled_cycle, x, parameters, memory, basis, jacobian)
-
-
-def event_based_cycle(
-    x: np.ndarray, parameters: ContactParameters, memory: np.ndarray, basis: HarmonicBasis, jacobian: bool = True
-) -> ContactCycle:
-    """The periodic cycle with the transitions of every slider located between samples."""
-    return _cycle(jenkins.event_based_cycle, x, parameters, memory, basis, jacobian)
-
-
+sampled_cycle = partial(_cycle, jenkins.sampled_cycle)
+event_based_cycle = partial(_cycle, jenkins.event_based_cycle)  # transitions of every slider located
 stamp_with(globals(), jenkins)

@@ -216,7 +216,7 @@ def _compared(tables: Mapping[str, Columns], path: Path) -> Columns:
         measured = {name: column_numbers(name, column) for name, column in csv_columns(path, ())[1].items()}
         if "cycles" not in measured:
             raise Refusal(f"no column cycles among {', '.join(measured)}")
-        columns = {name: measured.pop(name) for name in ("cycles", "force_N") if name in measured}
+        columns: Columns = {name: measured.pop(name) for name in ("cycles", "force_N") if name in measured}
         for name, values in measured.items():
             at_force = name not in tables["marks"]
             table = tables["peaks" if at_force else "marks"]
