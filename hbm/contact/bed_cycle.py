@@ -25,8 +25,7 @@ class Bed:
     k, g, dk, dg : (n_pair, SPRINGS), see `bed_springs`
     peak, angle : (n_pair,) deepest approach of the cycle [m] and where it is
     grows : (n_pair,) whether that is deeper than any approach before the cycle
-    sliders : (n_pair, SPRINGS, n_component - 1) their memory [m]; ratio : (n_pair,) tangential over normal stiffness
-    friction : (n_pair,) coefficient"""
+    sliders : (n_pair, SPRINGS, n_component - 1) their memory [m]; ratio : (n_pair,) tangential over normal stiffness"""
 
     parameters: ContactParameters
     k: np.ndarray
@@ -38,12 +37,9 @@ class Bed:
     grows: np.ndarray
     sliders: np.ndarray
     ratio: np.ndarray
-    friction: np.ndarray
 
     @classmethod
-    def of(
-        cls, x, parameters: ContactParameters, friction, memory: np.ndarray, basis: HarmonicBasis, located: bool
-    ) -> Bed:
+    def of(cls, x, parameters: ContactParameters, memory: np.ndarray, basis: HarmonicBasis, located: bool) -> Bed:
         """The bed at the deepest approach of the cycle x (n_pair, n_component, n_coeff) [m] and its past."""
         peak, angle = deepest_of(x[:, -1], basis, located)
         peak = peak - parameters.gap
@@ -51,7 +47,12 @@ class Bed:
         springs = bed_springs(parameters.packed(), np.where(grows, peak, memory[:, 0]))
         sliders = memory[:, 1:].reshape(len(x), -1, SPRINGS).transpose(0, 2, 1)
         ratio = tangential_ratio(parameters.numbers["poisson"])
-        return cls(parameters, *springs, peak, angle, grows, sliders, ratio, friction)
+        return cls(parameters, *springs, peak, angle, grows, sliders, ratio)
+
+    @property
+    def friction(self) -> np.ndarray:
+        """(n_pair,) coefficient."""
+        return self.parameters.numbers["friction"]
 
     @property
     def touch(self) -> np.ndarray:
@@ -63,7 +64,8 @@ class Bed:
         k = self.k[pair, spring]
         tangential = [self.ratio[pair] * k] * self.sliders.shape[2]
         stiff = np.stack([*tangential, k], axis=1)
-        return ContactParameters(self.parameters.components, stiff, self.touch[pair, spring], {})
+        numbers = {"friction": self.friction[pair]}
+        return ContactParameters(self.parameters.components, stiff, self.touch[pair, spring], numbers)
 
     def at_rest(self, x: np.ndarray, basis: HarmonicBasis) -> tuple[np.ndarray, np.ndarray]:
         """(n_pair, SPRINGS) whether a spring sticks all through the cycle x, and whether it never touches.
@@ -86,15 +88,15 @@ class Bed:
 
 
 def slider_positions(
-    x: np.ndarray, parameters: ContactParameters, friction: np.ndarray, memory: np.ndarray, basis: HarmonicBasis
+    x: np.ndarray, parameters: ContactParameters, memory: np.ndarray, basis: HarmonicBasis
 ) -> tuple[np.ndarray, np.ndarray]:
     """Positions of the sliders of all springs over the periodic cycle x (n_pair, n_component, n_coeff), and their load.
 
     Returns (n_pair, SPRINGS, n_component - 1, n_samples) [m], (n_pair, SPRINGS, n_samples) normal force [N]"""
-    bed = Bed.of(x, parameters, friction, memory, basis, located=False)
+    bed = Bed.of(x, parameters, memory, basis, located=False)
     motion = basis.to_time(x)
     pressed = np.maximum(motion[:, None, -1] - bed.touch[:, :, None], 0.0)
-    reach = (friction / bed.ratio)[:, None, None] * pressed  # at which one slips
+    reach = (bed.friction / bed.ratio)[:, None, None] * pressed  # at which one slips
     at, positions = bed.sliders, np.empty((*bed.sliders.shape, basis.n_samples))
     for _ in range(2):  # the memory of Jenkins elements repeats after the first
         for i in range(basis.n_samples):
@@ -103,12 +105,12 @@ def slider_positions(
     return positions, bed.k[:, :, None] * pressed
 
 
-def cycle(x, parameters, friction, memory, basis, jacobian, located: bool) -> ContactCycle:
+def cycle(x, parameters, memory, basis, jacobian=True, *, located: bool) -> ContactCycle:
     """The bed at the deepest approach of the cycle and its past.
 
     Springs that stick all through it are one spring; the others go by the cycle of Jenkins elements.
     x : (n_pair, n_component, n_coeff) [m]; memory : (n_pair, n_state) at the start"""
-    bed = Bed.of(x, parameters, friction, memory, basis, located)
+    bed = Bed.of(x, parameters, memory, basis, located)
     sticks, open_ = bed.at_rest(x, basis)
     force, slope = _stuck(bed, bed.k * sticks, x, basis, jacobian)
     add = _add_located if located else _add_sampled
@@ -135,8 +137,7 @@ def _add_located(bed, active, x, basis, force, slope, by_deepest, status):
     pair, spring = np.nonzero(active)
     start = np.ascontiguousarray(bed.sliders[pair, spring])
     elements = bed.elements(pair, spring)
-    motion, friction = np.ascontiguousarray(x[pair]), bed.friction[pair]
-    each = jenkins_cycle.cycle(motion, elements, start, basis, slope is not None, friction=friction)
+    each = jenkins_cycle.cycle(np.ascontiguousarray(x[pair]), elements, start, basis, slope is not None)
     force += _by_pair(each.force, pair, n_pair)
     np.bitwise_or.at(status, pair, each.status & ~SEPARATES)
     # the deepest spring is the last to let go: only where it opens the pair does

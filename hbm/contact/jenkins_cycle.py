@@ -38,13 +38,12 @@ from tribodyn.hbm.harmonics import HarmonicBasis
 
 
 def cycle(
-    x: np.ndarray, parameters: ContactParameters, memory: np.ndarray, basis: HarmonicBasis, jacobian: bool = True, *,
-    friction: np.ndarray | float = 0.0, normal_load: np.ndarray | float = 0.0,
-) -> ContactCycle:  # fmt: skip
+    x: np.ndarray, parameters: ContactParameters, memory: np.ndarray, basis: HarmonicBasis, jacobian: bool = True
+) -> ContactCycle:
     """The periodic cycle of a law of the Jenkins family.
 
     x : (n_pair, n_component, n_coeff) [m]; memory : (n_pair, n_tangential) slider positions at the start [m]
-    friction : (n_pair,) coefficient; normal_load : (n_pair,) constant, of a contact without the component n [N]"""
+    parameters : their numbers friction and, of a contact without the component n, normal_load; none where it has none"""
     n_pair, n_comp, n_coeff = x.shape
     skip = 0 if basis.has_static else 1  # inside, the constant is always there
     full = np.zeros((n_pair, n_comp, n_coeff + skip))
@@ -56,10 +55,10 @@ def cycle(
         load[:] = kn[:, None] * full[:, -1]
         load[:, 0] -= kn * parameters.gap
     else:
-        load[:, 0] = normal_load
+        load[:, 0] = parameters.numbers["normal_load"]
     # of one layout, as numba compiles the kernel for each that it meets
     k, memory = np.ascontiguousarray(parameters.stiffness), np.ascontiguousarray(memory)
-    mu = np.array(np.broadcast_to(np.asarray(friction, float), (n_pair,)))
+    mu = parameters.numbers.get("friction", np.zeros(n_pair))
     hs = np.asarray(basis.dynamic, np.int64)
     force = np.zeros_like(full)
     jac = np.zeros((n_pair, n_comp * n_coeff, n_comp * n_coeff)) if jacobian else np.zeros((0, 0, 0))

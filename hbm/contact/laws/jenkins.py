@@ -70,11 +70,7 @@ def step(x, w, p, f, dfx, dfs, dsx, dss):
     return bits
 
 
-def event_based_cycle(
-    x: np.ndarray, parameters: ContactParameters, memory: np.ndarray, basis: HarmonicBasis, jacobian: bool = True
-) -> ContactCycle:
-    """The periodic cycle with its transitions located between samples."""
-    return jenkins_cycle.cycle(x, parameters, memory, basis, jacobian, friction=parameters.numbers["friction"])
+event_based_cycle = jenkins_cycle.cycle
 
 
 def sampled_cycle(

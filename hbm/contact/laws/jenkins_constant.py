@@ -6,12 +6,10 @@ Source  Griffin 1980; Tamatam 2021, eq. 3.26-3.28 with N constant."""
 from dataclasses import dataclass
 
 import numba
-import numpy as np
 
 from tribodyn.declarations import number
 from tribodyn.hbm.contact import jenkins_cycle
-from tribodyn.hbm.contact.contact_law import SEPARATES, SLIPS, STICKS, ContactCycle, ContactParameters
-from tribodyn.hbm.harmonics import HarmonicBasis
+from tribodyn.hbm.contact.contact_law import SEPARATES, SLIPS, STICKS
 
 COMPONENTS = (("t1", "t2"), ("t1",), ("t2",))
 LINEAR_WHERE_STUCK = True
@@ -59,9 +57,4 @@ def step(x, w, p, f, dfx, dfs, dsx, dss):
     return bits
 
 
-def event_based_cycle(
-    x: np.ndarray, parameters: ContactParameters, memory: np.ndarray, basis: HarmonicBasis, jacobian: bool = True
-) -> ContactCycle:
-    """The periodic cycle with its transitions located between samples."""
-    friction, load = parameters.numbers["friction"], parameters.numbers["normal_load"]
-    return jenkins_cycle.cycle(x, parameters, memory, basis, jacobian, friction=friction, normal_load=load)
+event_based_cycle = jenkins_cycle.cycle

@@ -19,6 +19,7 @@ Source  Greenwood and Williamson 1966; Porter and Brake, MSSP 192 (2023) 110210;
 """
 
 from dataclasses import dataclass
+from functools import partial
 
 import numba
 import numpy as np
@@ -28,8 +29,7 @@ from tribodyn.hbm.contact import bed_cycle, bed_table
 from tribodyn.hbm.contact.asperity import asperity, tangential_ratio
 from tribodyn.hbm.contact.bed_table import ROWS, SPRINGS, TABULATED, bed_springs, look_up, tabulate_bed
 from tribodyn.hbm.contact.compiled_law import stamp_with
-from tribodyn.hbm.contact.contact_law import SEPARATES, SLIPS, STICKS, ContactCycle, ContactParameters
-from tribodyn.hbm.harmonics import HarmonicBasis
+from tribodyn.hbm.contact.contact_law import SEPARATES, SLIPS, STICKS, ContactParameters
 from tribodyn.refusal import Refusal
 
 COMPONENTS = (("t1", "t2", "n"), ("t1", "n"), ("t2", "n"))
@@ -96,13 +96,6 @@ def springs(parameters: ContactParameters) -> np.ndarray:
     stiff = bed_springs(packed, low)[0].sum(axis=1)
     ratio = tangential_ratio(n["poisson"])
     return np.stack([stiff if c == "n" else ratio * stiff for c in parameters.components], axis=1)
-
-
-def slider_positions(
-    x: np.ndarray, parameters: ContactParameters, memory: np.ndarray, basis: HarmonicBasis
-) -> tuple[np.ndarray, np.ndarray]:
-    """Positions of the sliders of all springs over a cycle and their load, see `bed_cycle.slider_positions`."""
-    return bed_cycle.slider_positions(x, parameters, parameters.numbers["friction"], memory, basis)
 
 
 def n_state(components: tuple[str, ...]) -> int:
@@ -175,18 +168,7 @@ def step(x, s, p, f, dfx, dfs, dsx, dss):
     return bits if f[n] > 0.0 else SEPARATES
 
 
-def sampled_cycle(
-    x: np.ndarray, parameters: ContactParameters, memory: np.ndarray, basis: HarmonicBasis, jacobian: bool = True
-) -> ContactCycle:
-    """The periodic cycle at the samples of the basis; see `_cycle`."""
-    return bed_cycle.cycle(x, parameters, parameters.numbers["friction"], memory, basis, jacobian, located=False)
-
-
-def event_based_cycle(
-    x: np.ndarray, parameters: ContactParameters, memory: np.ndarray, basis: HarmonicBasis, jacobian: bool = True
-) -> ContactCycle:
-    """The periodic cycle with the transitions of every spring and the deepest approach located between samples."""
-    return bed_cycle.cycle(x, parameters, parameters.numbers["friction"], memory, basis, jacobian, located=True)
-
-
+slider_positions = bed_cycle.slider_positions
+sampled_cycle = partial(bed_cycle.cycle, located=False)
+event_based_cycle = partial(bed_cycle.cycle, located=True)  # transitions of every spring, and the deepest approach
 stamp_with(globals(), bed_table)
