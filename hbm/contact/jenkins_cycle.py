@@ -43,7 +43,7 @@ def cycle(
     """The periodic cycle of a law of the Jenkins family.
 
     x : (n_pair, n_component, n_coeff) [m]; memory : (n_pair, n_tangential) slider positions at the start [m]
-    parameters : their numbers friction and, of a contact without the component n, normal_load; none where it has none"""
+    parameters : their numbers friction, and normal_load of a contact without the component n; none where it has none"""
     n_pair, n_comp, n_coeff = x.shape
     skip = 0 if basis.has_static else 1  # inside, the constant is always there
     full = np.zeros((n_pair, n_comp, n_coeff + skip))

@@ -4,9 +4,11 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+import scipy.linalg as sla
 
 from tests.helpers.coarse_beam import make
 from tribodyn.fem.factor import factorise
+from tribodyn.fem.system import SecondOrderSystem
 from tribodyn.reduction import craig_bampton as craig_bampton_module
 from tribodyn.reduction.craig_bampton import craig_bampton
 from tribodyn.reduction.limits import ReductionLimits
@@ -151,3 +153,14 @@ def test_rigid_bodies_are_not_damped():
     assert np.diag(phi.T @ C @ phi)[6:] == pytest.approx(2 + 3e-7 * (2 * np.pi * omega[6:]) ** 2, rel=1e-6)
     with pytest.raises(ValueError, match="must not be negative"):
         rayleigh(model.system, -1, 0)
+
+
+def test_damping_is_a_number_for_each_mode_that_vibrates():
+    """The first two have theirs, all further ones the last; two motions as a rigid body have none."""
+    rng = np.random.default_rng(0)
+    a, b = rng.normal(size=(6, 6)), rng.normal(size=(6, 4))
+    system = SecondOrderSystem(a @ a.T + np.eye(6), b @ b.T, None, {}, {})
+    squares, shapes = sla.eigh(system.stiffness, system.mass)
+    rate = shapes.T @ modal_damping(system, (0.01, 0.03, 0.02)) @ shapes
+    expected = 2 * np.array([0, 0, 0.01, 0.03, 0.02, 0.02]) * np.sqrt(np.maximum(squares, 0))
+    np.testing.assert_allclose(rate, np.diag(expected), atol=1e-12)

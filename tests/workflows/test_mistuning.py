@@ -105,6 +105,8 @@ def test_damping_by_two_modes_of_a_wheel_has_no_derivatives(scene: Path) -> None
     pair = ("response.frequency=['640 Hz', '680 Hz']", "damping={ratios=['2 %', '2 %'], modes=[0, 6]}")
     computed = unequal_sectors.mistuned(scene, overrides=pair)
     assert computed.lines()[-1].endswith("give damping.modal, or mass and stiffness")
+    by_mode = (pair[0], "damping={modal=['2 %', '1 %']}")
+    assert unequal_sectors.mistuned(scene, overrides=by_mode).lines()[-1].endswith("give one for all")
 
 
 def test_the_command_takes_any_wheel(scene: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
