@@ -1,7 +1,7 @@
 """What the commands of a tutorial print: they are run when the site is built, and their output stands below each.
 
 A page is followed as a reader does: named fences are files, Python is run, commands of tribodyn in this process.
-The first command of all pages is not run again where the tests of the same check have left what it printed and wrote.
+A command that the tests of the same check run too is not run again where they have left what it printed and wrote.
 """
 
 from __future__ import annotations
@@ -25,6 +25,8 @@ FOLLOWED = (
 )  # fmt: skip
 FENCE = re.compile(r"^```([a-z]+)(?: ([\w.]+))?\n(.*?)^```\n", re.M | re.S)
 FIRST = "./tribodyn run vane"
+OWN_PART = "./tribodyn run arm.toml --set verdict.enabled=false"
+SHARED = {FIRST: "first", OWN_PART: "own_part"}  # commands that tests run, and the folders of what they leave
 LINE_LIMIT = 30  # lines of an output
 
 
@@ -67,8 +69,8 @@ def _output_of(command: str) -> str:
         return ""
     if words[0] != "./tribodyn":
         raise RuntimeError(f"the build follows commands of tribodyn alone: {command}")
-    if command.strip() == FIRST and "TRIBODYN_FIRST" in os.environ:
-        test_output = Path(os.environ["TRIBODYN_FIRST"])
+    if command in SHARED and "TRIBODYN_SHARED" in os.environ:
+        test_output = Path(os.environ["TRIBODYN_SHARED"], SHARED[command])
         with FileLock(f"{test_output}.lock"):  # which the tests hold while they run it
             if test_output.is_dir():
                 shutil.copytree(test_output / "results", "results", dirs_exist_ok=True)

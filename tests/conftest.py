@@ -13,7 +13,7 @@ import pytest
 ROOMS = ("geometry", "fem", "reduction", "hbm", "workflows", "properties", "proof", "cases", "documentation")
 PROCESSES = ("subprocess", "multiprocessing")  # a test module that imports one of them starts processes
 LONG = (  # more than 12 s of processor each, the longest first
-    "test_pages", "test_errors", "test_rig", "test_stress", "test_lives", "test_scene_brb", "test_own_part",
+    "test_pages", "test_errors", "test_rig", "test_stress", "test_lives", "test_scene_brb",
     "test_contact_events", "test_run", "test_blade_study", "test_turbine", "test_properties_solver", "test_report",
     "test_scene_leaf_seal", "test_only_what_is_needed", "test_wear_steps", "test_operating_line", "test_convergence",
     "test_scene_blade", "test_wear_laws", "test_optimise", "test_structure", "test_cli", "test_scoreboard",

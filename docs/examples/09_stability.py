@@ -14,6 +14,7 @@ COARSE = {
     "verdict.enabled": False,
 }
 
-result = td.run("beam", overrides=COARSE | {"wear": None, "response.stability": True, "response.points": 24})
+judged = {"wear": None, "response.stability": True, "response.points": 12, "response.frequency": ["500 Hz", "1200 Hz"]}
+result = td.run("beam", overrides=COARSE | judged)
 print(f"{result.summary()['unstable_points']} of {len(result.response.frequency)} points are unstable")
 td.plot.response(result).savefig("stability.png")

@@ -7,7 +7,9 @@ import importlib
 import os
 import re
 import shutil
+from collections.abc import Callable
 from pathlib import Path
+from tempfile import TemporaryDirectory
 
 import numpy as np
 import pytest
@@ -15,32 +17,89 @@ from filelock import FileLock
 from PIL import Image
 
 import tribodyn as td
-from docs.outputs import FIRST, FOLLOWED
+from docs.outputs import FIRST, FOLLOWED, OWN_PART, SHARED
+from tests.helpers.command import printed_record, refusal
 from tests.helpers.pages import README, ROOT, SHOWN, fences, follow, name, pages, prepare, runs, shell
+from tribodyn.geometry.gmsh_session import save, session
 from tribodyn.workflows.report import text
 from tribodyn.workflows.scene import scene_file
-
-ELSEWHERE = {"docs/tutorials/own_part.md"}  # in test_own_part, which looks at its result too
 
 
 @pytest.fixture(scope="session")
 def after_the_first_command(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A folder where the first command of README and site has run; left to the build of the site where it asks."""
-    folder = prepare(tmp_path_factory.mktemp("first"))
-    path = Path(os.environ.get("TRIBODYN_FIRST", tmp_path_factory.mktemp("left") / "first"))
-    with FileLock(f"{path}.lock"):
-        printed = shell(FIRST, folder)
-        shutil.copytree(folder / "results", path / "results")
-        (path / "printed").write_text(printed, encoding="utf-8")
+    """A folder where the first command of README and site has run."""
+    return share(FIRST, prepare(tmp_path_factory.mktemp("first")), lambda folder: shell(FIRST, folder))
+
+
+@pytest.fixture(scope="session")
+def after_the_own_part(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A folder where the tutorial of a part of one's own was followed."""
+    page = ROOT / "docs/tutorials/own_part.md"
+    return share(OWN_PART, tmp_path_factory.mktemp("own"), lambda folder: follow(page, folder))
+
+
+def share(command: str, folder: Path, run: Callable[[Path], str]) -> Path:
+    """Run a command in a folder; what it leaves and prints goes to the build of the site too, where that asks."""
+    with TemporaryDirectory() as nobody:
+        path = Path(os.environ.get("TRIBODYN_SHARED", nobody), SHARED[command])
+        with FileLock(f"{path}.lock"):
+            printed = run(folder)
+            shutil.copytree(folder / "results", path / "results")
+            (path / "printed").write_text(printed, encoding="utf-8")
     return folder
+
+
+def test_a_part_of_ones_own_goes_from_its_drawing_to_its_worn_surface(after_the_own_part: Path) -> None:
+    result = td.load(after_the_own_part / "results/arm")
+    assert result.state.startswith("complete")
+    numbers = result.summary()
+    free, pressed = numbers["open_frequencies"], numbers["peak_frequency"]["first"]
+    assert free[1] < pressed < 3000  # the first mode across the load, stiffened by the stop
+    assert numbers["peak_frequency"]["last"] == pytest.approx(free[1], rel=0.02)  # worn off, the arm is free
+    assert (after_the_own_part / "results/arm/pictures/part.png").stat().st_size > 10_000
+
+
+GRIDS = """
+[ladders.mesh]
+worn_up_to = 0
+sizes = [1, 1.33, 2]
+set = [['geometry.mesh="arm_20.msh"'], ['geometry.mesh="arm_15.msh"'], ['geometry.mesh="arm_10.msh"']]
+"""
+
+
+def test_a_study_beside_the_scene_is_found(after_the_own_part: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    folder = after_the_own_part
+    for size in (20, 15, 10):
+        with session() as gmsh:
+            gmsh.parser.setNumber("size", [1e-3 * size])
+            gmsh.merge(str(folder / "arm.geo"))
+            gmsh.model.mesh.generate(3)
+            save(gmsh, folder / f"arm_{size}.msh")
+    (folder / "arm.study.toml").write_text(GRIDS)
+    words = ["study", "converge", str(folder / "arm.toml"), "--setting", "mesh", "--json", "--out", str(folder)]
+    rows = printed_record(words, capsys)
+    assert [row["size"] for row in rows] == [1, 1.33, 2]
+    assert all(row["outcome"] == "converged" for row in rows)
+    assert rows[0]["pairs"] < rows[2]["pairs"]
+    assert (folder / "converge_arm.png").is_file()
+
+
+@pytest.mark.parametrize(("study", "sentence"), [
+    ("[knobs.x]", "unknown key knobs"),
+    ("ladders = 3", "ladders: expected a table"),
+    ("[ladders.x]\nsizes = [1, 2]", "ladders.x.set is missing"),
+    ("[ladders", "arm.study.toml"),
+])  # fmt: skip
+def test_a_study_that_is_none_is_refused(after_the_own_part, study, sentence, capsys):
+    (after_the_own_part / "arm.study.toml").write_text(study)
+    assert sentence in refusal(["study", "converge", str(after_the_own_part / "arm.toml")], capsys)
 
 
 def with_something(long: bool) -> list[Path]:
     return [
         page
         for page in pages()
-        if name(page) not in ELSEWHERE
-        and (long or name(page).removeprefix("docs/").removesuffix(".md") not in FOLLOWED)
+        if (long or name(page).removeprefix("docs/").removesuffix(".md") not in FOLLOWED)
         and any((f.language == "sh" and f.word == "long") if long else runs(f) for f in fences(page))
     ]
 

@@ -94,13 +94,15 @@ def python(text: str, folder: Path) -> None:
     assert done.returncode == 0, f"{text}\n{done.stderr}"
 
 
-def follow(page: Path, folder: Path, long: bool = False) -> None:
-    """Do what a page says, in its order."""
+def follow(page: Path, folder: Path, long: bool = False) -> str:
+    """Do what a page says, in its order; what its commands print."""
     prepare(folder, warm.program())
+    printed = ""
     for fence in fences(page):
         if fence.word and fence.language in SHOWN:
             (folder / fence.word).write_text(fence.text)
         elif fence.language == "sh" and (fence.word == "long") == long and fence.word in ("", "long"):
-            shell(fence.text, folder)
+            printed += shell(fence.text, folder)
         elif fence.language == "python" and not fence.word and not long:
             python(fence.text, folder)
+    return printed
