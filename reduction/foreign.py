@@ -1,28 +1,6 @@
 """Bring your own matrices: M, K, C from another program, with the DOFs that touch, load and observe.
 
-    matrices = read_matrices("part.npz")  # M, K and, if there is one, C; or mass="M.mtx", stiffness="K.mtx"
-    system = matrices.system(loads={"press": {2: 0.5, 5: 0.5}, "shaker": 8}, outputs={"tip": 9})
-    contact = matrices.contact([[0, 1, 2], [3, 4, 5]], components=("t1", "t2", "n"), area=1e-5)
-    model = reduced_model(system, contact)  # dense; reduction.craig_bampton where there are many DOFs
-    springs = contact.stiffness(tangential=2e6, normal=3e6)
-    parameters = ContactParameters.of(contact.components, springs, friction=0.4)
-    excitation = Excitation.of({"press": 50.0}, {1: {"shaker": 20.0}})
-    basis = HarmonicBasis((0, 1, 2, 3), transitions="located")
-    balance = HarmonicBalance.of(model, Joint("contact", "jenkins", parameters), basis, excitation, omega_max=900.0)
-    response = natural.follow(balance, 200.0, 800.0, natural.Options(n_points=60))
-    print(response.frequency, response.amplitude("tip"))
-    law = JointWear.of("energy", coefficient=2e-15)
-    wear = WearProblem(balance, (Duty(AtPeak("tip", 200.0, 800.0)),), law, contact.area)
-    history = evolve(thesis.Rule(wear, 1e-6), max_steps=5)
-    print(history.cycles, history.depth.max(axis=1))
-
-with `ContactParameters` from hbm.contact.contact_law, `Joint` from hbm.contact.joint, `HarmonicBalance` from
-hbm.balance, `HarmonicBasis` from hbm.harmonics, `Excitation` from hbm.excitation, `natural` from
-hbm.continuation.methods, `AtPeak` from hbm.continuation.operating_point, `Duty` and `WearProblem` from
-hbm.wear.wear_problem, `JointWear` from hbm.wear.law, `thesis` from hbm.wear.rules and `evolve` from
-hbm.wear.wear_loop. The names of `import tribodyn` are a
-shorter way to the same; a scene with [model] does the same without Python.
-
+`tribodyn.matrices` has them for scripts, with an example; a scene with [model] does the same without Python.
 Units are SI after `scale`. A DOF is a number from 0, or (node, component) where the file carries labels (Abaqus text,
 ANSYS with its mapping file); the component is 1 to 6 or a name such as "UX" or "z"."""
 

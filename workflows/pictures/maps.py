@@ -6,6 +6,7 @@ from typing import Any
 import numpy as np
 
 from tribodyn.hbm.harmonics import HarmonicBasis
+from tribodyn.hbm.wear.history import WearHistory
 from tribodyn.refusal import Refusal
 from tribodyn.workflows.pictures.figures import (
     area_energy_unit,
@@ -50,9 +51,7 @@ def status_maps(result: Result, count: int = 8) -> Figure:
     """Status over the cycle at up to `count` wear steps, evenly chosen among the rows that curves show.
 
     Raises  Refusal where nothing was worn or the patch has no faces"""
-    patch, wear = _with_faces(result), result.wear
-    if wear is None or not result.wear_steps:
-        raise Refusal("the result holds no worn patch with faces to draw a map on")
+    patch, wear = _worn(result)
     last = int(np.flatnonzero(wear.cycles <= shown_cycles(wear))[-1])
     rows = np.unique(np.linspace(0, last, count).round().astype(int))
     columns = min(len(rows), 4)
@@ -74,9 +73,7 @@ def motion_maps(result: Result, rows: Sequence[int] | np.ndarray | None = None) 
     """What the pairs of a worn contact do in a cycle at wear rows, the first, a middle and the last by default.
 
     Raises  Refusal where nothing was worn or the patch has no faces"""
-    patch, wear = _with_faces(result), result.wear
-    if wear is None or not result.wear_steps:
-        raise Refusal("the result holds no worn patch with faces to draw a map on")
+    patch, wear = _worn(result)
     n = len(wear.cycles)
     rows = np.unique([0, (n - 1) // 2, n - 1]) if rows is None else rows
     basis = HarmonicBasis(result.harmonics, LAYOUT.samples)
@@ -169,6 +166,13 @@ def _with_faces(result: Result) -> Patch:
     if not len(result.patch.faces):
         raise Refusal("the result holds no patch with faces to draw a map on")
     return result.patch
+
+
+def _worn(result: Result) -> tuple[Patch, WearHistory]:
+    patch, wear = _with_faces(result), result.wear
+    if wear is None or not result.wear_steps:
+        raise Refusal("the result holds no worn patch with faces to draw a map on")
+    return patch, wear
 
 
 def _label_axes(grid: np.ndarray, patch: Patch) -> None:

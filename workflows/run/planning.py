@@ -4,7 +4,7 @@ The costs are rules of thumb, good to a factor of about three: they distinguish 
 
 import tempfile
 from collections.abc import Iterator
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, field, fields, replace
 from math import prod
 from pathlib import Path
 from types import ModuleType
@@ -55,8 +55,8 @@ COSTS = Costs()
 
 
 @dataclass(frozen=True)
-class Plan:
-    """Sizes, memory [bytes] and time [s] of a scene; wear_steps is None where it is not known, 0 without wear.
+class ModelSizes:
+    """Numbers of elements, nodes, free DOFs, contact pairs and masters of a scene.
 
     remarks : on faces that are glued or rub and lie apart"""
 
@@ -64,6 +64,14 @@ class Plan:
     nodes: int
     full_dofs: int
     contact_pairs: int
+    masters: int
+    remarks: tuple[str, ...] = field(default=(), kw_only=True)
+
+
+@dataclass(frozen=True)
+class Plan(ModelSizes):
+    """Sizes, memory [bytes] and time [s] of a scene; wear_steps is None where it is not known, 0 without wear."""
+
     model_dofs: str
     unknowns: int
     memory: float
@@ -73,7 +81,6 @@ class Plan:
     wear_solves: int
     solve_seconds: float
     verdict: bool
-    remarks: tuple[str, ...] = ()
 
     def lines(self) -> list[tuple[str, str]]:
         """The plan as pairs of a name and a readable value."""
@@ -111,10 +118,10 @@ def plan(file: SceneFile) -> Plan:
         sizes = _extrapolated(file, largest) if largest > COSTS.largest else _measured(file)
         groups = int(built.geometry is not None and built.geometry.no_turning is not None)
         modes, cutoff = built.reduction.modes, built.reduction.cutoff
-        sparse = without_masters(built, sizes.pairs * len(components(scene)), groups > 0)
+        sparse = without_masters(built, sizes.contact_pairs * len(components(scene)), groups > 0)
         if sparse:
             sizes = replace(sizes, masters=LIMITS.clusters * len(components(scene)) + 5)
-    full, pairs, masters = sizes.full, sizes.pairs, sizes.masters
+    full, pairs, masters = sizes.full_dofs, sizes.contact_pairs, sizes.masters
     basis = HarmonicBasis(scene.harmonics.kept or COSTS.harmonics, scene.harmonics.samples)
     n_component = len(components(scene))
     contact = pairs * n_component
@@ -130,10 +137,7 @@ def plan(file: SceneFile) -> Plan:
     reduction = COSTS.factor * full**1.5 + COSTS.back * full * model + 4 * COSTS.dense * model**3
     steps, solves = _wear(scene)
     return Plan(
-        elements=sizes.elements,
-        nodes=sizes.nodes,
-        full_dofs=full,
-        contact_pairs=pairs,
+        **vars(sizes),
         model_dofs=str(model) if modes is not None else f"{masters} and the modes up to {cutoff:g} Hz",
         unknowns=contact * basis.n_coeff,
         memory=memory,
@@ -143,20 +147,7 @@ def plan(file: SceneFile) -> Plan:
         wear_solves=solves,
         solve_seconds=5e-3 + basis.n_coeff * (COSTS.sparse * full if sparse else COSTS.solve * contact**2),
         verdict=scene.verdict.enabled,
-        remarks=sizes.remarks,
     )
-
-
-@dataclass(frozen=True)
-class ModelSizes:
-    """Numbers of elements, nodes, free DOFs, contact pairs and masters of a scene; remarks : see `Plan`"""
-
-    elements: int
-    nodes: int
-    full: int
-    pairs: int
-    masters: int
-    remarks: tuple[str, ...] = ()
 
 
 def _measured(file: SceneFile) -> ModelSizes:
@@ -168,7 +159,7 @@ def _measured(file: SceneFile) -> ModelSizes:
     remarks = _openings(scene, mesh, node_sets, joined)
     free = free_dofs(3 * mesh.doflocs.shape[1], joined.clamps, node_sets)
     pairs, masters = _contact(scene, mesh, node_sets, free)
-    return ModelSizes(int(mesh.nelements), mesh.doflocs.shape[1], len(free), pairs, masters, tuple(remarks))
+    return ModelSizes(int(mesh.nelements), mesh.doflocs.shape[1], len(free), pairs, masters, remarks=tuple(remarks))
 
 
 def _parts(file: SceneFile) -> Iterator[tuple[str, ModuleType, Any]]:
@@ -206,7 +197,7 @@ def _extrapolated(file: SceneFile, largest: float) -> ModelSizes:
     power = np.log(first / second) / np.log(ratios[0] / ratios[1])
     remark = "the mesh is too large to be made for a plan: its sizes are extrapolated from two coarser ones"
     elements, nodes, full, pairs, masters = np.rint(first * ratios[0] ** -power).astype(int).tolist()
-    return ModelSizes(elements, nodes, full, pairs, masters, (remark,))
+    return ModelSizes(elements, nodes, full, pairs, masters, remarks=(remark,))
 
 
 def _openings(

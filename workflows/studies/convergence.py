@@ -50,8 +50,30 @@ class Convergence(StudyResult):
         ]
 
     def plot(self) -> Figure:
-        """Draw errors against seconds."""
-        return costs(self.table)
+        """Error in amplitude, energy and life, as far as there are any, against seconds."""
+        table, quantities = self.table, ("amplitude", "energy", "life")
+        shown = [q for q in quantities if any(q in ladder.limits for ladder in table.ladders)] or ["amplitude"]
+        with mpl.rc_context(STYLE):
+            figure = Figure(figsize=(4.2 * len(shown) + 1.6, 4.0), layout="constrained")
+            panes = figure.subplots(1, len(shown), squeeze=False)[0]
+            colours = mpl.colormaps["tab20"].colors
+            for pane, quantity in zip(panes, shown, strict=True):
+                for i, ladder in enumerate(table.ladders):
+                    points = [
+                        (row.solved.seconds, b) for row in ladder.rows if (b := ladder.bound(row, quantity)) is not None
+                    ]
+                    seconds, errors = zip(*points, strict=True) if points else ((), ())
+                    style = {"color": colours[i % 20], "marker": MARKERS[i % len(MARKERS)], "linestyle": "none"}
+                    label = ladder.ladder.name.replace("_", " ")
+                    pane.plot(seconds, np.maximum(errors, FLOOR), label=label, markersize=5, **style)
+                pane.set_xscale("log")  # before its formatter
+                pane.axhline(TARGET_ERROR, color=GREY, linestyle=":", linewidth=1)
+                pane.xaxis.set_minor_formatter(NullFormatter())
+                pane.set(yscale="log", xlabel="seconds of one processor", title=f"{table.scene}: {_name(quantity)}")
+            panes[0].set_ylabel("relative error, with the doubt in it")
+            handles = panes[0].get_legend_handles_labels()
+            panes[-1].legend(*handles, loc="center left", bbox_to_anchor=(1.0, 0.5), fontsize=8)
+        return figure
 
     def write(self, folder: Path) -> list[Path]:
         """Write a picture of what the settings cost."""
@@ -137,30 +159,3 @@ def _cell(ladder: LadderTable, row: LadderRow, quantity: str) -> str:
 
 def _order(order: float) -> str:
     return "scattered" if np.isnan(order) else f"order {order:.1f}"
-
-
-def costs(table: LadderTables) -> Figure:
-    """Error in amplitude, energy and life, as far as there are any, against seconds."""
-    quantities = [q for q in ("amplitude", "energy", "life") if any(q in ladder.limits for ladder in table.ladders)]
-    shown = quantities or ["amplitude"]
-    with mpl.rc_context(STYLE):
-        figure = Figure(figsize=(4.2 * len(shown) + 1.6, 4.0), layout="constrained")
-        panes = figure.subplots(1, len(shown), squeeze=False)[0]
-        colours = mpl.colormaps["tab20"].colors
-        for pane, quantity in zip(panes, shown, strict=True):
-            for i, ladder in enumerate(table.ladders):
-                points = [
-                    (row.solved.seconds, b) for row in ladder.rows if (b := ladder.bound(row, quantity)) is not None
-                ]
-                seconds, errors = zip(*points, strict=True) if points else ((), ())
-                style = {"color": colours[i % 20], "marker": MARKERS[i % len(MARKERS)], "linestyle": "none"}
-                label = ladder.ladder.name.replace("_", " ")
-                pane.plot(seconds, np.maximum(errors, FLOOR), label=label, markersize=5, **style)
-            pane.set_xscale("log")  # before its formatter
-            pane.axhline(TARGET_ERROR, color=GREY, linestyle=":", linewidth=1)
-            pane.xaxis.set_minor_formatter(NullFormatter())
-            pane.set(yscale="log", xlabel="seconds of one processor", title=f"{table.scene}: {_name(quantity)}")
-        panes[0].set_ylabel("relative error, with the doubt in it")
-        handles = panes[0].get_legend_handles_labels()
-        panes[-1].legend(*handles, loc="center left", bbox_to_anchor=(1.0, 0.5), fontsize=8)
-    return figure

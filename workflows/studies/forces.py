@@ -22,7 +22,7 @@ from tribodyn.hbm.threads import limited
 from tribodyn.refusal import SolveFailed
 from tribodyn.workflows.run import modelling, part_reduction, scene_assembly, scene_loads, settings
 from tribodyn.workflows.run.progress import Progress
-from tribodyn.workflows.scene.scene_file import Overrides, SceneFile, Source, read_scene
+from tribodyn.workflows.scene.scene_file import Overrides, Source, read_scene
 from tribodyn.workflows.scene.schema import MeshScene
 from tribodyn.workflows.studies.study_result import StudyResult
 
@@ -88,11 +88,7 @@ def forces(scene: Source, *, overrides: Overrides = ()) -> Forces:
     scene : name of a scene with a mesh, or a .toml file
     Raises  SceneError for a scene of matrices; SolveFailed where the contact does not settle"""
     file = read_scene(scene, overrides)
-    return of_scene(file, file.mesh_scene)
-
-
-def of_scene(file: SceneFile, scene: MeshScene) -> Forces:
-    """The forces of a scene that was read."""
+    scene = file.mesh_scene
     with limited(scene.solver.threads):
         model = modelling.build(file, Progress())
         part, balance = model.part, model.balance.with_load(0.0)

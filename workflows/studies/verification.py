@@ -30,7 +30,7 @@ from tribodyn.workflows.result.provenance import rebuilt
 from tribodyn.workflows.result.result import Result
 from tribodyn.workflows.result.store import ResultSource, result_of
 from tribodyn.workflows.run import modelling, settings
-from tribodyn.workflows.run.progress import Progress, Report, reporter
+from tribodyn.workflows.run.progress import Report, reporter
 from tribodyn.workflows.scene.fields import Frequency
 from tribodyn.workflows.scene.scene_file import Overrides, override_texts
 from tribodyn.workflows.scene.schema import Scene
@@ -227,41 +227,24 @@ def verify(
     allow_scripts : run Python files and drawings (.geo) that its scene names
     Raises  Refusal: the result has no such row or no solution to start from; SolveFailed: no balance solution"""
     result, report = result_of(result), reporter(progress)
-    file = rebuilt(result, override_texts(overrides))
-    with limited(file.scene.solver.threads):
-        unworn = modelling.build(file, report, result.harmonics).balance
-    omega = None if at is None else 2 * np.pi * at
-    return held_against(result, file.scene, unworn, omega, row, steps, report, law == "rigid")
-
-
-def held_against(
-    result: Result,
-    scene: Scene,
-    unworn: HarmonicBalance,
-    at: float | None,
-    row: int | None,
-    steps: int | None,
-    progress: Progress,
-    rigid: bool = False,
-) -> TimeComparison:
-    """The comparison with the model at hand: the scene of a result and its unworn problem; at : [rad/s].
-
-    rigid : without the springs of the contact"""
-    start = time.perf_counter()
+    file, rigid = rebuilt(result, override_texts(overrides)), law == "rigid"
+    scene, requested = file.scene, None if at is None else 2 * np.pi * at
     with limited(scene.solver.threads):
-        balance, omega, x = _start(result, scene, unworn, at, row)
-        target = omega if at is None else at
+        unworn = modelling.build(file, report, result.harmonics).balance
+        start = time.perf_counter()
+        balance, omega, x = _start(result, scene, unworn, requested, row)
+        target = omega if requested is None else requested
         if not 0 < target <= balance.omega_max:
             raise Refusal(
                 f"{target / (2 * np.pi):g} Hz is outside what the scene models, up to "
                 f"{balance.omega_max / (2 * np.pi):g} Hz: change response.frequency with --set"
             )
-        with progress.stage("harmonic balance"):
+        with report.stage("harmonic balance"):
             solution = _walk(balance, omega, target, x, settings.newton_options(scene))
         if not solution.converged:
             raise SolveFailed(f"no balance at {target / (2 * np.pi):g} Hz: {solution.outcome}")
         steps = steps or (2 if rigid else 1) * steps_of(balance)
-        with progress.stage("time integration"):
+        with report.stage("time integration"):
             options = Options(steps, tolerance=TOLERANCE, max_periods=PERIODS, rigid=rigid)
             integration = march.verify(balance, solution.state, options)
             with_springs = replace(options, rigid=False)

@@ -4,7 +4,7 @@ import json
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 
@@ -27,15 +27,14 @@ from tribodyn.workflows.studies.many.quantiles import RARE, Influence, Sample, i
 from tribodyn.workflows.studies.many.run_task import solve
 from tribodyn.workflows.studies.many.study_file import LISTED, ParameterStudy
 from tribodyn.workflows.studies.many.study_runs import Runner
-from tribodyn.workflows.studies.many.study_table import LIFE, Journal, StudyTable
-from tribodyn.workflows.studies.study_result import StudyResult
+from tribodyn.workflows.studies.many.study_table import LIFE, Journal, RunsResult, StudyTable
 
 COEFFICIENT = "wear.coefficient"
 BATCH = 8  # runs that are added at a time
 
 
 @dataclass(frozen=True, repr=False)
-class LifeDistribution(StudyResult):
+class LifeDistribution(RunsResult):
     """A number as a distribution.
 
     table : of the full runs; runs : that have the number; open : of them, those with only a lower bound of it
@@ -45,6 +44,8 @@ class LifeDistribution(StudyResult):
     scatter : standard deviation of the number's logarithm; of the number itself where it is not always above 0
     model_error : relative, None where it is not known; model_error_of : where it is from, or why it is not known
     values, weights : (n,) in order: the expected distribution"""
+
+    STEM: ClassVar[str] = "lives"
 
     name: str
     number: str
@@ -93,16 +94,6 @@ class LifeDistribution(StudyResult):
         texts.append(f"scatter {scatter}; measured exactly, a key leaves of it (first and total Sobol index):")
         texts += [f"  {i.key:32}{100 * i.remaining:6.1f} %   ({i.first:.3f}, {i.total:.3f})" for i in self.influences]
         return self.table.troubles() + texts
-
-    @property
-    def defects(self) -> list[str]:
-        return self.table.defects
-
-    @property
-    def files(self) -> list[Path]:
-        """What it left beside the study's tables."""
-        folder = self.table.folder
-        return [] if folder is None else [folder / "lives.json", folder / "lives.png"]
 
     def plot(self) -> Figure:
         """The distribution with its quantiles, and what it depends on."""

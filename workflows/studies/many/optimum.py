@@ -11,8 +11,7 @@ Source  SLSQP of SciPy: Kraft 1988; weights: Knowles 2006, doi 10.1109/TEVC.2005
 import json
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from pathlib import Path
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 
@@ -29,19 +28,20 @@ from tribodyn.workflows.studies.many.proposals import EvaluatedRuns, chebyshev, 
 from tribodyn.workflows.studies.many.run_task import RUN
 from tribodyn.workflows.studies.many.study_file import LISTED, Aim, ParameterStudy
 from tribodyn.workflows.studies.many.study_runs import Runner
-from tribodyn.workflows.studies.many.study_table import SENTENCE, StudyTable
-from tribodyn.workflows.studies.study_result import StudyResult
+from tribodyn.workflows.studies.many.study_table import SENTENCE, RunsResult, StudyTable
 
 GAIN = 1e-3  # of an aim, of its logarithm where it is positive and of its range else, that one run more is worth
 
 
 @dataclass(frozen=True, repr=False)
-class Optimum(StudyResult):
+class Optimum(RunsResult):
     """Result of an optimisation.
 
     table : of all runs; front : rows of the table that no other allowed one beats in all aims, by the first aim
     best : row of the one nearest to the best of every aim, each between its ends on the front; the best of one aim
     bounded : by aim, rows of which only a lower bound is known, such as lives that did not end"""
+
+    STEM: ClassVar[str] = "optimum"
 
     name: str
     aims: tuple[Aim, ...]
@@ -90,16 +90,6 @@ class Optimum(StudyResult):
             for number, value in self.values(row).items()
         )
         return f"run {self.table.columns[RUN][row]}: {values}   with {keys}"
-
-    @property
-    def defects(self) -> list[str]:
-        return self.table.defects
-
-    @property
-    def files(self) -> list[Path]:
-        """What it left beside the study's tables."""
-        folder = self.table.folder
-        return [] if folder is None else [folder / "optimum.json", folder / "optimum.png"]
 
     def plot(self) -> Figure:
         """The trade of the first two aims, or how the one aim got better."""

@@ -8,7 +8,7 @@ import os
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, get_args
+from typing import TYPE_CHECKING, Any, ClassVar, get_args
 
 import numpy as np
 from scipy import stats
@@ -138,6 +138,23 @@ class StudyTable(StudyResult):
     def plot(self) -> Figure:
         """Response against each of the keys that vary, see `many.pictures`."""
         return study_pictures.panes(self)
+
+
+class RunsResult(StudyResult):
+    """Result that is made of the runs of a study. STEM : name of its files beside those of the study"""
+
+    table: StudyTable
+    STEM: ClassVar[str]
+
+    @property
+    def defects(self) -> list[str]:
+        return self.table.defects
+
+    @property
+    def files(self) -> list[Path]:
+        """What it left beside the study's tables."""
+        folder = self.table.folder
+        return [] if folder is None else [folder / f"{self.STEM}.json", folder / f"{self.STEM}.png"]
 
 
 def table(
