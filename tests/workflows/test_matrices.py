@@ -75,7 +75,7 @@ def test_the_scene_is_the_same_as_the_rooms_in_turn(folder: Path) -> None:
         f"response.frequency=['{200 / (2 * np.pi)!r} Hz', '{800 / (2 * np.pi)!r} Hz']", "response.points=60",
         "wear.max_steps=5", "harmonics.transitions=located", "verdict.enabled=false",
     ]  # fmt: skip
-    result = pipeline.run(read("own.toml", overrides), folder, Progress())
+    result = pipeline.run(read(str(folder / "own.toml"), overrides), folder, Progress())
     assert result.response is not None
     theirs = result.response
     common = np.isin(theirs.omega, ours.omega)  # the scene's curve has its solved peaks, too
