@@ -88,38 +88,38 @@ def forces(scene: Source, *, overrides: Overrides = ()) -> Forces:
     scene : name of a scene with a mesh, or a .toml file
     Raises  SceneError for a scene of matrices; SolveFailed where the contact does not settle"""
     file = read_scene(scene, overrides)
-    scene = file.mesh_scene
-    with limited(scene.solver.threads):
+    mesh_scene = file.mesh_scene
+    with limited(mesh_scene.solver.threads):
         model = modelling.build(file, Progress())
         part, balance = model.part, model.balance.with_load(0.0)
         assert part is not None
-        omega = 2 * np.pi * settings.response_range(scene)[0]
+        omega = 2 * np.pi * settings.response_range(mesh_scene)[0]
         solved = arc_length.solve_along_load(balance, omega, newton.NewtonOptions(tolerance=TOLERANCE))
         if not solved.converged:
             raise SolveFailed(f"the contact does not settle under the static loads: {solved.outcome}")
         force = solved.state.cycle.force
         q = full_displacement(balance, solved.state.flat, force.reshape(solved.state.flat.shape), omega)[:, 0]
-    joined = scene_assembly.connections(scene, file.folder)
+    joined = scene_assembly.connections(mesh_scene, file.folder)
     static = {name: value.real for (harmonic, name), value in balance.excitation.loads.items() if harmonic == 0}
-    loads = scene_loads.loads_on(scene, part.mesh, file.folder, joined)
+    loads = scene_loads.loads_on(mesh_scene, part.mesh, file.folder, joined)
     acting = [(static[name], load) for name, load in loads.items() if name in static]
-    if joined.constraints and scene.wheel is None and not scene.prescribed and not len(part.held_rows):
+    if joined.constraints and mesh_scene.wheel is None and not mesh_scene.prescribed and not len(part.held_rows):
         q = _completed(part, balance.excitation.force(0, part.system.loads, len(q)).real, force[:, :, 0], q)
     u, none = part.field(q), np.zeros((len(part.points), 3))
-    mass, stiffness = assemble(part.mesh, part_reduction.material(scene, part.mesh))
+    mass, stiffness = assemble(part.mesh, part_reduction.material(mesh_scene, part.mesh))
     for spring in joined.springs:
         stiffness = stiffness + spring.matrix(part.mesh, part.node_sets)
     load = sum(
         (value * applied.vector(part.mesh, part.node_sets, mass).reshape(-1, 3) for value, applied in acting), none
     )
-    if scene.wheel is not None and scene.wheel.speed:  # in a turning frame it grows with the displacement
-        softening = spin_softening(mass, scene.wheel.axis, 2 * np.pi * scene.wheel.speed)
+    if mesh_scene.wheel is not None and mesh_scene.wheel.speed:  # in a turning frame it grows with the displacement
+        softening = spin_softening(mass, mesh_scene.wheel.axis, 2 * np.pi * mesh_scene.wheel.speed)
         load = load - (softening @ u.ravel()).reshape(-1, 3)
-    by_joint = _contact_forces(scene, part, force[:, :, 0]) | _bolt_forces(scene, part, static, acting, u)
+    by_joint = _contact_forces(mesh_scene, part, force[:, :, 0]) | _bolt_forces(mesh_scene, part, static, acting, u)
     reaction = (stiffness @ u.ravel()).reshape(-1, 3) - load - sum(by_joint.values(), none)
     by_joint |= _constraint_forces(joined, part, reaction)
     sets = {b.name: find_group(part.node_sets, b.name) for b in part.mesh.bodies if b.name}
-    supported = _supported(scene, part, joined)
+    supported = _supported(mesh_scene, part, joined)
     bodies = []
     for name, nodes in (sets or {"part": np.arange(len(part.points))}).items():
         joints = {joint: on[nodes].sum(axis=0) for joint, on in by_joint.items() if on[nodes].any()}
