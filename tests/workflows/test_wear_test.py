@@ -51,6 +51,15 @@ def test_marks_are_those_of_the_scenes_own_wear(replayed: td.studies.ReplayedTes
         == set(replayed.tables["loops"]["cycles"])
         == set(marks["cycles"][[0, -1]])
     )
+    first = replayed.tables["loops"]["cycles"] == 0
+    x, friction = (replayed.tables["loops"][name][first] for name in ("displacement_m", "friction_N"))
+    assert (x[0], friction[0]) == (x[-1], friction[-1])
+    assert x.max() == pytest.approx(-x.min())
+    balance = model.balance
+    moved = history.duty_displacement[0, 0].reshape(balance.contact.n_pair, 3, -1)
+    motion = balance.history(balance.evaluate(float(history.omega[0]), moved))[0][:, 1]  # t2, along the force
+    area = balance.model.interface.area
+    assert np.ptp(x) == pytest.approx(np.ptp(area @ motion / area.sum()), rel=1e-12)
 
 
 def test_a_measurement_stands_row_by_row(replayed: td.studies.ReplayedTest, tmp_path: Path, capsys) -> None:

@@ -81,7 +81,8 @@ class ReplayedTest(StudyResult):
                     at = (table["cycles"] == cycles) & (force == level)
                     colour = mpl.colormaps[WEAR_MAP](0.9 * cycles / max(table["cycles"].max(), 1.0))
                     pane.plot(table[x][at], table[y][at], color=colour, label=f"{cycles:.3g} cycles")
-                pane.set(xlabel=_label(x), ylabel=_label(y), title=f"{level:g} N" if level else "")
+                scale = "log" if (table[y] > 0).all() else "linear"
+                pane.set(xlabel=_label(x), ylabel=_label(y), yscale=scale, title=f"{level:g} N" if level else "")
             handles, labels = np.atleast_1d(panes)[0].get_legend_handles_labels()
             step = max(len(handles) // 6, 1)
             figure.legend(handles[::step], labels[::step], loc="outside right upper", fontsize=8)
@@ -160,7 +161,9 @@ def _columns(names: str, parts: list[np.ndarray]) -> Columns:
 
 
 def _label(name: str) -> str:
-    return name.replace("_", " / ")
+    """Of an axis, the unit behind the word."""
+    word, _, unit = name.rpartition("_")
+    return f"{word} / {unit.capitalize() if unit == 'hz' else unit}" if len(unit) < 3 else name.replace("_", " ")
 
 
 def _at_marks(history: WearHistory, area: np.ndarray, marks: np.ndarray, noise: float = 1e-7) -> Columns:
@@ -197,16 +200,20 @@ def _swept(
 
 
 def _loops(model: modelling.Model, history: WearHistory, area: np.ndarray, marks: np.ndarray) -> Columns:
-    """Friction force over the mean sliding displacement of the contact at the wear step nearest to every mark."""
+    """Friction force over the mean displacement of the contact at the wear step nearest to every mark, the first again.
+
+    Along the tangential component in which the contact moves most; along the normal one where it has no other."""
     parts = []
     for cycles in marks:
         row = int(np.abs(history.cycles - cycles).argmin())
         worn = model.balance.worn(history.depth[row])
         x = history.duty_displacement[row, 0].reshape(worn.contact.n_pair, -1, worn.basis.n_coeff)
         u, force = worn.history(worn.evaluate(float(history.omega[row]), x))
-        sliding = area @ u[:, 0] / area.sum()
-        middle = (sliding.max() + sliding.min()) / 2
-        parts.append(np.stack([np.full(len(sliding), cycles), sliding - middle, force[:, 0].sum(axis=0)]))
+        closed = [*range(u.shape[2]), 0]
+        mean, total = np.tensordot(area / area.sum(), u[..., closed], 1), force[..., closed].sum(axis=0)
+        at = max(worn.contact.tangential or [0], key=lambda c: float(np.ptp(mean[c])))
+        middle = (mean[at].max() + mean[at].min()) / 2
+        parts.append(np.stack([np.full(len(closed), cycles), mean[at] - middle, total[at]]))
     return _columns("cycles displacement_m friction_N", parts)
 
 
