@@ -193,7 +193,8 @@ class ChangeTable:
             self.estimate(Refinement.SPRINGS, self.names_of_wear, None, "wear with stiffer springs is not measured")
         with self.refusals(Refinement.SPRINGS):
             factors, states = zip(*contact_springs.stiffened(first, closed, self.limits), strict=True)
-            text = f"springs up to {factors[-1]:g} times as stiff"
+            highest = states[-1].balance.basis.harmonics[-1]
+            text = f"springs up to {factors[-1]:g} times as stiff, harmonics to {highest}"
             for name, value in first.values.items():
                 values = [state.values[name] for state in states]
                 limit = ladders.springs_limit(factors, values, self.limits.floor)

@@ -30,14 +30,18 @@ def stiffened(
     tops = {f: top for f, top in tops.items() if contact.stiffness.size * (2 * top + 1) <= limits.max_unknowns}
     yield STIFFER[0], state
     for factor, top in tops.items():
-        scaled = {joint.name: factor if joint.name in names else 1.0 for joint in contact.joints}
-        parameters = [replace(j.parameters, stiffness=scaled[j.name] * j.parameters.stiffness) for j in contact.joints]
-        joints = tuple(replace(j, parameters=p) for j, p in zip(contact.joints, parameters, strict=True))
-        balance = state.balance.with_contact(replace(contact, joints=joints))
-        balance = balance.with_samples(max(basis.n_samples, 16 * top), basis.transitions == "located")
         harmonics = (*basis.harmonics, *range(basis.harmonics[0], top + 1))
         try:
-            state = operating_states.with_harmonics(replace(state, balance=balance), harmonics, max(tops.values()))
+            for part in (factor / 4, factor / 2, factor):  # more harmonics first, then the springs in two steps
+                joints = tuple(
+                    replace(j, parameters=replace(j.parameters, stiffness=part * j.parameters.stiffness))
+                    if j.name in names
+                    else j
+                    for j in contact.joints
+                )
+                balance = state.balance.with_contact(replace(contact, joints=joints))
+                balance = balance.with_samples(max(basis.n_samples, 16 * top), basis.transitions == "located")
+                state = operating_states.with_harmonics(replace(state, balance=balance), harmonics, max(tops.values()))
         except (Refusal, SolverFailure):
             return
         yield factor, state

@@ -167,13 +167,14 @@ def _of_stiffness(scene: Scene) -> list[Setting]:
         top = harmonic_with_springs(harmonics.top, factor)
         highest = f"highest={top}" if harmonics.automatic else f"kept={list(range(harmonics.kept[0], top + 1))}"
         finer = (f"harmonics.{highest}", f"harmonics.samples={max(harmonics.samples, 16 * top)}")
-        settings.append(Setting(factor, (*(f"{k}={factor * v!r}" for k, v in keys.items()), *finer), f"{factor:g} x"))
+        springs = tuple(f"{key}={factor * value!r}" for key, value in keys.items())
+        settings.append(Setting(math.sqrt(factor), (*springs, *finer), f"{factor:g} x"))
     return settings
 
 
 def harmonic_with_springs(highest: int, factor: float) -> int:
-    """Highest harmonic with springs so many times as stiff: what they do takes less time, by the cube root of it."""
-    return math.ceil(max(highest, 3) * factor ** (1 / 3))
+    """Highest harmonic with springs so many times as stiff: a mass turns on them in a time that falls with the root."""
+    return math.ceil((max(highest, 3) + 1) * math.sqrt(factor)) - 1
 
 
 def _numbers(key: str, values: Sequence[float]) -> list[Setting]:
@@ -232,11 +233,13 @@ def limit_of(size: Sequence[float], value: Sequence[float]) -> Limit:
 
 
 def springs_limit(factors: Sequence[float], values: Sequence[float], least: float) -> Limit | None:
-    """The limit without springs; None where the changes do not shrink, by half at least, or are below `least`."""
+    """The limit without springs; None where the changes do not shrink, to 0.6 at most, or are below `least`.
+
+    A slider that turns with a mass halves them: the springs' error falls with their root, and with it the harmonics'"""
     steps = np.abs(np.diff(values[-3:]))
-    if len(steps) < 2 or (steps[1] > 0.5 * steps[0] and steps[1] > least * abs(values[-1])):
+    if len(steps) < 2 or (steps[1] > 0.6 * steps[0] and steps[1] > least * abs(values[-1])):
         return None
-    return limit_of(factors, values) if values[-1] else Limit(0.0, math.nan, 0.0)
+    return limit_of([math.sqrt(factor) for factor in factors], values) if values[-1] else Limit(0.0, math.nan, 0.0)
 
 
 def _order(h: np.ndarray, ratio: float) -> float:
