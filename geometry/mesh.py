@@ -83,11 +83,11 @@ def quality(mesh: Any) -> Quality:
     element, _ = np.unravel_index(scaled.argmin(), scaled.shape)
     lowest = float(scaled.min())
     if not lowest > 0.0:
-        centre = ", ".join(f"{1e3 * x:.4g}" for x in mesh.p[:, mesh.t[:, element]].mean(axis=1))
+        centre = ", ".join(f"{x:.4g}" for x in mesh.p[:, mesh.t[:, element]].mean(axis=1))
         inverted = int((~(scaled > 0.0)).any(axis=1).sum())
         raise Refusal(
-            f"{inverted} of {mesh.nelements} mesh elements are inverted or degenerate, the worst at ({centre}) mm: "
-            "refine the mesh there or soften the shape"
+            f"{inverted} of {mesh.nelements} mesh elements are inverted or degenerate, the worst at ({centre}) "
+            "in the unit of the mesh: choose another element size there or soften the shape"
         )
     volume = float((determinant[:, -len(weights) :] @ weights).sum())
     return Quality(scaled_jacobian=lowest, worst_element=int(element), volume=volume)

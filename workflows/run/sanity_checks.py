@@ -22,6 +22,7 @@ from tribodyn.geometry.mesh import facts
 from tribodyn.hbm.balance import HarmonicBalance
 from tribodyn.workflows.result.summary import LARGEST_BEND
 from tribodyn.workflows.run import matrix_model, part_reduction, scene_assembly
+from tribodyn.workflows.run.damping_matrices import check_damping
 from tribodyn.workflows.scene.matrix_scene import MatrixScene
 from tribodyn.workflows.scene.part_tables import SolidMaterial
 from tribodyn.workflows.scene.scene_file import SceneFile
@@ -110,6 +111,7 @@ def remarks(file: SceneFile, model: Model) -> list[str]:
     doubts += check_speed(scene, model.reduced.accuracy().get("line_error"))
     if model.reduced.at_harmonic(1)[0].damping is None:
         doubts.append("there is no damping but that of friction: give [damping]")
+    doubts += check_damping(scene, model.reduced)
     if _unpressed(model.balance, 2 * np.pi * max(scene.response.range)):
         doubts.append(
             "nothing presses the contact together at rest, so that it rubs by chance: give [loads.static.NAME]"

@@ -137,6 +137,8 @@ def speed_line(
             sectors.append(sector(scene.model_copy(update={"wheel": wheel_at_speed}), part, start))
             if len(sectors) == 2:
                 ends = reduce_alike(sectors, scene.reduction.modes, scene.reduction.cutoff)
+        except StaticDivergence:  # names the speed
+            raise
         except Refusal as refusal:
             raise Refusal(f"at {60 * speed:.6g} rpm {refusal}") from None
         if len(sectors) == 2:

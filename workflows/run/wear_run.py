@@ -50,7 +50,7 @@ def wear_down(file: SceneFile, model: Model, result: Result, keep: Keeper, advan
             due = begun + (process_time() - begun) / KEEPING
         done = float(patch.area @ (row.depth + row.worn)) / to_wear if to_wear > 0 else 0.0
         deepest, hertz = 1e3 * float((row.depth + row.worn).max()), row.omega / (2 * np.pi)
-        state = f"{row.cycles + row.cycles_in_step:.3g} cycles, peak {hertz:.4g} Hz and {1e3 * row.amplitude:.3g} mm"
+        state = f"{row.cycles + row.cycles_in_step:.3g} cycles, {hertz:.4g} Hz and {1e3 * row.amplitude:.3g} mm"
         note = f"step {len(rows)}, {state}, preload {row.preload:.4g} N, depth {deepest:.3g} mm"
         advance(done, note, (row.cycles + row.cycles_in_step, row.preload))
 
