@@ -19,6 +19,8 @@ from tribodyn.workflows.errors import operating_states, refine
 from tribodyn.workflows.errors.refinement_limits import DEFAULT
 from tribodyn.workflows.result import summary
 from tribodyn.workflows.run import modelling, pipeline, planning, sanity_checks
+from tribodyn.workflows.run.damping_matrices import check_damping
+from tribodyn.workflows.run.joints import contact_stiffness
 from tribodyn.workflows.run.progress import Progress
 from tribodyn.workflows.scene import scene_file
 from tribodyn.workflows.scene.scene_file import SceneError
@@ -33,6 +35,18 @@ def test_a_joint_between_two_bodies_carries_what_presses_them(tmp_path: Path) ->
     assert solved.converged
     assert model.balance.preload(solved.state) == pytest.approx(0.5e6 * 0.04 * 0.014, rel=1e-6)
     assert [joint.name for joint in model.balance.contact.joints] == ["lap"]
+
+
+@pytest.mark.parametrize(("state", "count"), [("free", 1), ("stuck", 0)])
+def test_a_damping_ratio_of_loose_bodies_is_remarked(state: str, count: int, tmp_path: Path) -> None:
+    file = scene_file.parse(BLOCKS, "scene.toml", (f"damping.state={state}",), tmp_path)
+    reduced = modelling.build(file, Progress()).reduced
+    frequency, shapes = linear_modes(reduced, contact_stiffness(file.mesh_scene, reduced), 1)
+    ratio = shapes[:, 0] @ reduced.system.damping @ shapes[:, 0] / (4 * np.pi * frequency[0])
+    assert ratio == pytest.approx(0.01, rel=1e-6) or state == "free"
+    remarks = check_damping(file.scene, reduced, share=0.95)
+    assert len(remarks) == count
+    assert all(f"{frequency[0]:.4g} Hz has {100 * ratio:.2g} % instead of 1 %" in remark for remark in remarks)
 
 
 def test_a_body_that_slides_away_is_no_solution(tmp_path: Path) -> None:
