@@ -6,7 +6,6 @@ from collections.abc import Callable, Sequence
 
 from proof.bench import events, problem as problems, record
 from proof.bench.record import CURVE, TRUTH, Record
-from tribodyn.refusal import Refusal
 
 COLUMNS = {
     "tribodyn": "tribodyn", "tribodyn_time": "tribodyn, in time", "nlvib": "NLvib", "tmdsimpy": "tmdsimpy",
@@ -25,11 +24,7 @@ def compute(names: Sequence[str], with_truth: bool, say: Callable[[str], None]) 
             settings, source = f"{events.STEPS} steps a period", f"./tribodyn prove bench {name} --truth"
             head = {"problem": name, "program": "integration from event to event", "settings": settings}
             Record({**head, "source": source}, tuple(events.sweep(problem))).write(TRUTH)
-        try:
-            balance = columns.balance_of(problem)
-        except Refusal as refusal:
-            say(f"{name}: {refusal}")
-            continue
+        balance = columns.balance_of(problem)
         column, motions = columns.in_frequency(problem, balance)
         column.write("tribodyn")
         if problem.truth == "events" or problem.is_rigid:

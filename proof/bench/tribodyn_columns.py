@@ -4,12 +4,13 @@ from __future__ import annotations
 
 from dataclasses import replace
 from itertools import groupby, pairwise
+from pathlib import Path
 from time import process_time
 
 import numpy as np
 
 import tribodyn as td
-from proof.bench.problem import Element, Problem
+from proof.bench.problem import FOLDER, Element, Problem
 from proof.bench.record import CURVE, POINT, Record, Row
 from tribodyn.hbm import newton
 from tribodyn.hbm.continuation.methods import arc_length
@@ -24,28 +25,31 @@ Motions = list[tuple[td.matrices.Cycle, float]]
 
 
 def _law(element: Element) -> str:
+    if element.numbers["belt"]:
+        return str(FOLDER / "belt_friction.py")
     return LAWS.get(element.law, "coulomb_planar" if len(element.components) == 3 else "jenkins")
 
 
 def balance_of(problem: Problem) -> td.matrices.Balance:
-    """The harmonic balance of a problem; raises Refusal where an element has no law here."""
-    if any(element.numbers["belt"] for element in problem.elements):
-        raise Refusal("no contact law has a body that moves on steadily")
+    """The harmonic balance of a problem."""
     matrices, contacts = td.matrices.from_arrays(problem.mass, problem.stiffness, problem.damping), []
     for law, group in groupby(sorted(problem.elements, key=_law), key=_law):
         elements = list(group)
-        values = {key: np.array([e.numbers[key] for e in elements]) for key in ("gap", "k3", "limit", "friction")}
+        values = {
+            key: np.array([e.numbers[key] for e in elements]) for key in ("gap", "k3", "limit", "friction", "belt")
+        }
         numbers = {
             "cubic_spring": {"cubic": values["k3"]}, "unilateral": {},
             "jenkins_constant": {"friction": 1.0, "normal_load": values["limit"]},
-        }.get(law, {"friction": values["friction"]})  # fmt: skip
+            "belt_friction": {"friction": 1.0, "normal_load": values["limit"], "speed": values["belt"]},
+        }.get(Path(law).stem, {"friction": values["friction"]})  # fmt: skip
         tangential, normal = (
             np.array([_springs(problem, e.rows[at], e.numbers[key]) for e in elements])
             for key, at in (("kt", 0), ("kn", -1))
         )
         rows, components = np.vstack([e.rows for e in elements]), elements[0].components
         face = matrices.contact_rows(rows, components, area=float(len(elements)), gap=values["gap"])
-        contacts.append(td.matrices.Contact(law, face, law, tangential, normal, numbers))
+        contacts.append(td.matrices.Contact(Path(law).stem, face, law, tangential, normal, numbers))
     loads = {f"{part} {h}": pair[i] for h, pair in problem.loads.items() for i, part in enumerate(("cos", "sin"))}
     structure = td.matrices.reduce(
         matrices, contacts, loads={"static": problem.static, **loads}, outputs={"output": problem.output}
