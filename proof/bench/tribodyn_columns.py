@@ -81,9 +81,11 @@ def in_frequency(problem: Problem, balance: td.matrices.Balance) -> tuple[Record
     branch = arc_length.follow(inner, begin, high, options)
     seconds = process_time() - clock
     stable = np.full(len(branch.omega), np.nan) if problem.is_rigid else balance.stability(branch).stable
+    on_belts = any(element.numbers["belt"] for element in problem.elements)
+    energy = np.where(on_belts, np.nan, branch.energy)  # on the structure alone
     curve = zip(
         branch.omega, branch.amplitude("output"), _mean(branch.response[:, 0]),
-        np.angle(branch.fundamental("output")), branch.energy, stable, branch.converged, strict=True,
+        np.angle(branch.fundamental("output")), energy, stable, branch.converged, strict=True,
     )  # fmt: skip
     rows = [Row(CURVE, w, a, m, p, e, stable=float(s)) for w, a, m, p, e, s, solved in curve if solved]
     motions = Motions()
@@ -100,13 +102,20 @@ def in_frequency(problem: Problem, balance: td.matrices.Balance) -> tuple[Record
     for cycle, is_stable in motions:
         q = cycle.outputs["output"]
         phase, mean = np.angle(q[len(q) % 2] - 1j * q[len(q) % 2 + 1]), float(_mean(q))
-        energy, shares = float(cycle.energy.sum()), _shares(balance, inner.history(cycle.state)[1])
+        force = inner.history(cycle.state)[1]
+        energy, shares = _work(problem, cycle.energy, force, cycle.state.omega), _shares(balance, force)
         row = Row(POINT, cycle.state.omega, cycle.amplitude("output"), mean, phase, energy, *shares, is_stable)
         rows += [] if row.is_in(rows) else [row]
     settings = f"orders {', '.join(map(str, problem.orders))}; {problem.samples} samples; {len(branch.omega)} points"
     settings += f"; springs {SPRINGS:g} times as stiff as the structure" if problem.is_rigid else ""
     note = "" if branch.arrived or branch.ended is BranchEnd.CLOSED else str(branch.end)
     return Record(_head(problem, settings, seconds, note), tuple(rows)), motions
+
+
+def _work(problem: Problem, energy: np.ndarray, force: np.ndarray, omega: float) -> float:
+    """Friction work of a period [J], of `energy` on the structure and of forces (n_pair, ..., n_time) on belts."""
+    belts = np.array([e.numbers["belt"] for e in problem.elements])
+    return float(energy.sum() - belts @ force[:, 0].mean(axis=-1) * HZ / omega)
 
 
 def _mean(coefficients: np.ndarray) -> np.ndarray:
@@ -143,7 +152,7 @@ def in_time(problem: Problem, balance: td.matrices.Balance, motions: Motions, st
             notes.append(str(failure))
             continue
         phase = float(np.angle(np.mean(m.outputs[0] * np.exp(-1j * m.omega * m.time))))
-        energy, shares = float(m.energy.sum()), _shares(balance, m.force)
+        energy, shares = _work(problem, m.energy, m.force, m.omega), _shares(balance, m.force)
         row = Row(POINT, m.omega, float(m.amplitude[0]), float(m.outputs[0].mean()), phase, energy, *shares, 1.0)
         notes += [] if m.periodic else [f"{m.omega:g} rad/s: {m.outcome}"]
         rows += [] if row.is_in(rows) or not m.periodic else [row]

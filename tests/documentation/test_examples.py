@@ -11,7 +11,11 @@ import pytest
 import tribodyn as td
 
 FILE = Path(__file__).parents[2] / "docs" / "reference" / "examples.py"
-GRIDS = {"td.studies.trade", "td.studies.converge"}  # take minutes: shown in the table of reference/python.md
+GRIDS = {
+    "td.studies.trade",
+    "td.studies.converge",
+    "td.studies.replay",
+}  # take minutes: shown in the table of reference/python.md
 WHEELS = {"td.wheel.flutter"}  # takes minutes: shown in flutter.md
 
 

@@ -20,7 +20,7 @@ SMALL: dict[str, Any] = {
 # a value in SI units at which a number matters in the beam; a law with a new number needs a line here
 # laws without a table of their own; one with a table is in test_rough_scene
 PLAIN = [law for law in contact_law.names() if not hasattr(contact_law.load(law), "TABLE")]
-VALUES = {"friction": 0.5, "normal_load": 2e3, "cubic": 1e15, "coefficient": 2e-15}
+VALUES = {"friction": 0.5, "normal_load": 2e3, "cubic": 1e15, "weak": 0.4, "exponent": 0.5, "coefficient": 2e-15}
 
 
 def numbers(table: str, law: str, declared: tuple[declarations.Number, ...], changed: str = "") -> dict[str, Any]:
