@@ -43,7 +43,7 @@ LIMITS = {
     "imports upwards": 0,
     "commands": 13,
     "public names": 40,
-    "constants": 481,
+    "constants": 480,
     "lines": 56_450,
     "lines of tests": 32_000,
     "lines of proof": 8_500,
@@ -59,7 +59,7 @@ LIMITS = {
 GRANTS: dict[str, dict[int, int]] = {"lines": {57: 1_200, 58: 1_500, 59: 900}}
 # limits that are not met yet -> what there is; it only falls, and goes when the limit is met
 MISSED = {
-    "lines": 62_107,
+    "lines": 61_934,
 }
 
 
