@@ -35,7 +35,8 @@ def balance_of(name, components, transitions):
     model = replace(model, interface=interface(np.asarray(model.interface.B)[rows], components))
     rng = np.random.default_rng(1)
     numbers = law_numbers(name, friction=0.4, normal_load=rng.uniform(20, 60, PAIRS), slip_force=16.0, free=1e14)
-    numbers |= {n.name: 0.5 * n.high for n in contact_law.declared(name) if n.high == numbers[n.name]}  # off the limit
+    at_limit = [n for n in contact_law.declared(name) if np.all(n.high == numbers[n.name])]  # no derivative there
+    numbers |= {number.name: 0.5 * number.high for number in at_limit}
     gap = -1e-5 * rng.random(PAIRS)
     parameters = ContactParameters.of(components, rng.uniform(0.5, 2, (PAIRS, len(components))) * K, gap=gap, **numbers)
     basis = HarmonicBasis((0, 1, 2, 3), 64, transitions)
