@@ -66,12 +66,11 @@ def errors_of_steps(law: str, components: tuple[str, ...]) -> dict[str, float]:
             nearby = {k: step(z + k * direction, p) for k in (-3, -2, -1, 1, 2, 3)}
             if all(b == bits for b, _, _ in nearby.values()):
                 sides = [nearby[k][1] - nearby[-k][1] for k in (1, 2, 3)]
-                fourth, difference = (
-                    (8 * sides[0] - sides[1]) / 12e-3,
-                    (45 * sides[0] - 9 * sides[1] + sides[2]) / 60e-3,
-                )
-                if np.abs(fourth - difference).max() < 1e-7:  # no slider of several comes to slip within the step
-                    slopes.append(np.abs(slope[:, column] - difference).max() / (1 + np.abs(difference).max()))
+                fourth = (8 * sides[0] - sides[1]) / 12e-3
+                difference = (45 * sides[0] - 9 * sides[1] + sides[2]) / 60e-3
+                size = 1 + np.abs(difference).max()
+                if np.abs(fourth - difference).max() < 1e-7 * size:  # no slider of several begins to slip in between
+                    slopes.append(np.abs(slope[:, column] - difference).max() / size)
     pull = max(*pulls, *opened) if len(opened) > 1 else 0.0  # a spring that never opens may pull
     return dict(zip(MOST, (max(slopes), pull, missing), strict=False))
 
