@@ -182,9 +182,9 @@ def _at_marks(history: WearHistory, area: np.ndarray, marks: np.ndarray, noise: 
 def _swept(
     file: SceneFile, model: modelling.Model, history: WearHistory, marks: np.ndarray, report: Progress
 ) -> dict[str, Columns]:
-    """The highest and all points of the response curves at every mark and force."""
+    """The highest, of amplitude nan where a curve ends early, and all points of the curves at every mark and force."""
     assert file.scene.test is not None
-    forces, points = file.scene.test.sweeps, list[np.ndarray]()
+    forces, points, tops = file.scene.test.sweeps, list[np.ndarray](), list[np.ndarray]()
     scale = abs(driving_load(file.scene)[1]) if forces else 1.0
     with report.track("sweeps") as advance:
         for i, cycles in enumerate(marks):
@@ -195,7 +195,8 @@ def _swept(
                 height = branch.amplitude(settings.OUTPUT)
                 curve = np.stack([np.full(len(height), cycles), np.full(len(height), force), branch.frequency, height])
                 points.append(curve[:, branch.converged])
-    names, tops = "cycles force_N frequency_hz amplitude_m", [curve[:, [curve[3].argmax()]] for curve in points]
+                tops.append(points[-1][:, [points[-1][3].argmax()]] * ([[1]] * 3 + [[1 if branch.arrived else np.nan]]))
+    names = "cycles force_N frequency_hz amplitude_m"
     return {"peaks": _columns(names, tops), "sweeps": _columns(names, points)}
 
 
